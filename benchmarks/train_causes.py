@@ -104,7 +104,7 @@ def print_confusion(model: Model, samples: Sequence[UnstableSamples], folds: Int
     for fold in range(N_FOLDS):
         others = [sample for sample, own in zip(samples, folds, strict=True) if own != fold]
         head = fit(model, others)
-        weights, names = head.linear.raw_weights(), np.array(head.classes)
+        weights, names = head.rule.raw_weights(), np.array(head.classes)
         for k in np.flatnonzero(folds == fold):
             scores = samples[k].features @ weights[:, 1:].T + weights[:, 0]
             places = (np.searchsorted(CAUSES, samples[k].causes),)

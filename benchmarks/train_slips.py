@@ -176,7 +176,7 @@ def fitted(
     others = [] if speed is None else [speed]
     if not part.normalised:
         return [slip, *others]
-    rule, columns = slip.linear, part.indices(part.stable)
+    rule, columns = slip.rule, part.indices(part.stable)
     location, scale = (values[columns] for values in part.default_handling)
     weights = np.array(rule.weights[0]) / np.array(rule.scale)
     intercept = rule.intercepts[0] - float(weights @ np.array(rule.mean))

@@ -93,15 +93,9 @@ def test_simulation(run, tmp_path):
         "--jobs", "2")  # fmt: skip
 
 
-def test_training_and_audit_of_labels(run, tmp_path, recordings):
-    program = (
-        "import sys\n"
-        "from holdfast.cli import main\n"
-        "folder, model = sys.argv[1:]\n"
-        "sys.exit(main(['train', folder, '-o', model, '--trials', '0', '--jobs', '2'])\n"
-        "         or main(['label', '--audit', folder, '--jobs', '2']))\n"
-    )
-    run(recordings, tmp_path / "model.json", program=program)
+def test_training(run, tmp_path, recordings):
+    model = tmp_path / "model.json"
+    run("train", recordings, "-o", model, "--trials", "0", "--jobs", "2")
 
 
 def test_tasks_of_the_study(run, tmp_path):

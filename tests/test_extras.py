@@ -75,9 +75,8 @@ MISSING = {
         ["tune", "builtin:any", ".", "-o", "m.json", "--false-alarms", "1"],
         ["import", "log.csv", "others", "--sensor", "anyskin", "--jobs", "2"],
     ],
-    "label": [["label", "."], ["label", "--auto", "signal", "grasp.mcap"]],
+    "label": [["label", "."], ["label", "auto", "signal", "grasp.mcap"]],
     "video": [["label", "markers", "sheet.pdf"]],
-    "label,train": [["label", "--audit", "grasp.mcap"]],
     "parquet": [
         ["info", "other/grasp.parquet"],
         ["detect", "builtin:any", "other/grasp.parquet"],

@@ -7,8 +7,7 @@ import pytest
 
 DETECTING = ("holdfast.model", "holdfast.detector", "holdfast.live.stream_detector")
 OF_EXTRAS = (
-    "jinja2", "joblib", "matplotlib", "mujoco", "onnx", "onnxruntime", "optuna", "pyarrow",
-    "scipy", "sklearn",
+    "jinja2", "joblib", "matplotlib", "mujoco", "optuna", "pyarrow", "scipy", "sklearn",
 )  # fmt: skip
 PROGRAM = """
 import sys

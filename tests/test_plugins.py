@@ -29,7 +29,6 @@ from holdfast.io.foreign import end_children
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
-from holdfast.synthetic import synthetic_recording
 from holdfast_grip.hands import open_hand
 from holdfast_grip.laws import law_named
 from installed import install, install_project, on_the_path
@@ -80,23 +79,6 @@ def __getattr__(name):
 def not_a_hand(uri):
     return Path(uri)
 '''
-MARKS = """
-from holdfast.contact import ContactState
-from holdfast.recordings import Label
-
-def can_read(path):
-    return path.suffix == ".marks"
-
-def read(path, recording, annotator):
-    return {path.read_text(): [Label(0.0, 0.5, ContactState.STABLE, author=annotator)]}
-
-def save(recordings, folder, *, force):
-    folder.mkdir()
-    paths = [folder / f"{recording.name}.marks" for recording in recordings]
-    for path in paths:
-        path.write_text("thumb")
-    return paths
-"""
 POINTS = {
     "holdfast.sensors": {"pad": "parts:pad", "gtac": "parts:pad", "other": "parts:pad"},
     "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
@@ -109,7 +91,6 @@ POINTS = {
         "odd": "parts:odd",
     },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
-    "holdfast.labels": {"marks": "marks", "mute": "parts"},
     "holdfast.verbs": {"count": "parts:count", "sum": "parts:pad_name"},
 }
 
@@ -118,7 +99,7 @@ POINTS = {
 def parts(tmp_path, monkeypatch):
     """A package with plug-ins of all kinds, some of which cannot be used."""
     broken = "import sys\nprint('imported', file=sys.stderr)\nraise RuntimeError('no\\n\x1bdevice')"
-    files = {"parts.py": PARTS, "broken.py": broken, "marks.py": MARKS}
+    files = {"parts.py": PARTS, "broken.py": broken}
     install(tmp_path / "site", "acme", files, POINTS)
     for group in (SENSOR_PLUGINS, IMPORTER_PLUGINS):
         monkeypatch.setattr(group, "_reported", set())
@@ -212,23 +193,6 @@ def test_formats_of_packages_that_are_not_installed_are_named(tmp_path, monkeypa
         import_recordings(tmp_path, "far")
 
 
-def test_labels_of_a_plug_in(parts, capsys, caplog):
-    holdfast.save_recording(synthetic_recording("grasp", 0), parts / "grasp.mcap")
-    words = ["label", "--export", "marks", parts / "out", parts / "grasp.mcap", "--json"]
-    assert main([*map(str, words)]) == 0
-    (path,) = json.loads(capsys.readouterr().out)["written"]
-    words = ["label", "--import", path, parts / "grasp.mcap", "--annotator", "ann", "--json"]
-    assert main([*map(str, words)]) == 0
-    (label,) = holdfast.load_recording(parts / "grasp.mcap").modules["thumb"].labels
-    assert (label.state, label.end, label.author) == ("STABLE", 0.5, "ann")
-    assert main(["label", "--export", "mute", str(parts / "out"), str(parts / "grasp.mcap")]) == 2
-    assert "the plug-in of the format mute cannot be used" in capsys.readouterr().err
-    assert "a module with can_read, read and save expected for mute, <mod" in reports(caplog)[-1]
-    missing = ["label", "--export", "yaml", str(parts / "out"), str(parts / "grasp.mcap")]
-    assert main(missing) == 2
-    assert "--export label-studio or marks or mute or csv expected" in capsys.readouterr().err
-
-
 VERB_OF_KIND = {
     "exporters": "export", "simulators": "simulate", "publishers": "serve", "panels": "serve",
     "players": "play",
@@ -271,7 +235,7 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
-    assert works == {"pad", "same", "twice", "grab", "hollow", "count", "marks"}
+    assert works == {"pad", "same", "twice", "grab", "hollow", "count"}
     assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out

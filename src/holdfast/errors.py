@@ -31,7 +31,6 @@ EXTRA_MODULES = {
     "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
-    "onnx": ("onnx", "onnxruntime"),
     "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
@@ -44,14 +43,13 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "video": "holdfast label markers, record --camera, and stickers in videos",
-    "onnx": "classifiers as ONNX files",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "deep": "the neural network of holdfast study",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "grip": "holdfast hold: control of the grip force of a hand",
-    "interop": "LeRobot, Foxglove, Rerun, Label Studio and public data sets",
+    "interop": "LeRobot, Foxglove, Rerun and public data sets",
 }
 """Purpose of each extra, also of those that install packages beside the core."""
 
@@ -91,7 +89,6 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "importers": ("anyskin-slip", "arq-crisp", "eflesh", "gtac", "lerobot", "uskin-pick-move"),
         "exporters": ("foxglove", "lerobot", "rerun"),
         "publishers": ("rerun",),
-        "labels": ("label-studio",),
         "options": ("export --fps", "export --model", "serve --rerun"),
     },
 }

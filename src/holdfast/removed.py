@@ -3,18 +3,49 @@
 LAST_COMMIT = "f7d623e5"
 """Commit of version 0.3.0, which still has all of it."""
 
+AUDIT = "holdfast evaluate MODEL RECORDINGS --plot FILE shows where labels and model differ most"
+COMPARE = "holdfast label export csv FOLDER RECORDINGS, once for each set of labels"
+LABELS_AS_CSV = "labels as CSV, by holdfast label export csv and holdfast label import FILE"
+
 REMOVED: dict[str, dict[str, str]] = {
-    "verbs": {},
+    "verbs": {
+        "label audit": AUDIT,
+        "label compare": COMPARE,
+    },
     "options": {
+        "label --auto": "holdfast label auto RULE RECORDINGS",
+        "label --export": "holdfast label export csv FOLDER RECORDINGS",
+        "label --import": "holdfast label import FILE RECORDINGS",
+        "label --audit": AUDIT,
+        "label --page": AUDIT,
+        "label --jobs": AUDIT,
+        "label --compare": COMPARE,
+        "label --dry-run": "holdfast label auto RULE RECORDINGS --dry-run",
+        "label --force": "holdfast label auto RULE RECORDINGS --force",
+        "label --set": "holdfast label auto RULE RECORDINGS --set NAME=VALUE",
+        "label --video": "holdfast label auto tracking RECORDING --video FILE",
+        "label --fps": "holdfast label auto tracking RECORDING --video FILE --fps RATE",
+        "label --motion": "holdfast label auto tracking RECORDING --motion FILE",
+        "label --column": "holdfast label auto tracking RECORDING --motion FILE --column NAME",
+        "label --annotator": LABELS_AS_CSV,
+        "label import --annotator": LABELS_AS_CSV,
         "train --objective": "none; the search of an SVM minimises errors, any other the log loss",
     },
     "sources": {},
     "importers": {},
-    "exporters": {},
+    "labels": {"label-studio": LABELS_AS_CSV},
+    "exporters": {
+        "onnx": "holdfast export MODEL model.h carries a model to other programs",
+    },
     "hands": {},
+    "rules": {
+        "onnx": "train a model with holdfast train, or apply a classifier of your own to what "
+        "holdfast.features_frame returns",
+    },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
-`verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand"."""
+`verbs`, `options`, `sources`, ..., `labels`, formats of labels, and `rules`, the rules of heads in
+model files; an option has its verb before it, as in "serve --hand"."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import approx_fprime
 from sklearn.linear_model import LogisticRegression
 
-from holdfast.classifiers import Adapted, Fitted, Linear, Onnx
-from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, linear_prior, log_odds
+from holdfast.classifiers import Adapted, Fitted, Linear
+from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, log_odds
 from holdfast.errors import TrainingError
 
 from .test_recipes import samples
@@ -214,12 +214,3 @@ def test_the_search_covers_the_reference():
             return low
 
     assert Adapted(PRIOR).suggest(Trial()) == {"change": "weights", "C": 1e-6}
-
-
-def test_a_classifier_that_is_not_linear_is_refused():
-    assert linear_prior(PRIOR) is PRIOR
-    with pytest.raises(TrainingError) as raised:
-        linear_prior(Onnx.of(b"any", 3))
-    assert str(raised.value) == (
-        "a model with linear classifiers expected to adapt, an ONNX file given"
-    )

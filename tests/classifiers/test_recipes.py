@@ -124,7 +124,7 @@ def test_logistic_regression_decides_as_scikit_learn(weight, share):
     peer = LogisticRegression(C=1.0, class_weight=weight, tol=1e-10, max_iter=1000)
     peer.fit(features, given.positive)
     decision = peer.decision_function(features)
-    assert fitted.linear.decision(given.features) == pytest.approx(decision, abs=1e-3)
+    assert fitted.rule.decision(given.features) == pytest.approx(decision, abs=1e-3)
     clear = np.abs(decision) > 1e-3
     stable = fitted.probability(given.features) >= fitted.threshold
     assert np.array_equal(stable[clear], peer.predict(features)[clear])
@@ -133,7 +133,7 @@ def test_logistic_regression_decides_as_scikit_learn(weight, share):
 def test_logistic_regression_without_weights_equals_scikit_learn():
     given = samples(share=0.2)
     fitted = recipe("logreg").fit(given, parameters("logreg", None), 0)
-    assert (fitted.linear.slope, fitted.linear.offset, fitted.threshold) == (1.0, 0.0, 0.5)
+    assert (fitted.rule.slope, fitted.rule.offset, fitted.threshold) == (1.0, 0.0, 0.5)
 
 
 @pytest.mark.parametrize("weight", WEIGHTS)
@@ -145,7 +145,7 @@ def test_svm_decides_as_scikit_learn(weight):
         loss="hinge", class_weight=weight, tol=1e-8, max_iter=1_000_000, random_state=1
     )
     decision = peer.fit(features, given.positive).decision_function(features)
-    assert fitted.linear.decision(given.features) == pytest.approx(decision, abs=0.05)
+    assert fitted.rule.decision(given.features) == pytest.approx(decision, abs=0.05)
     clear = np.abs(decision) > 0.05
     stable = fitted.probability(given.features) >= fitted.threshold
     assert np.array_equal(stable[clear], peer.predict(features)[clear])
@@ -168,7 +168,7 @@ def test_svm_minimises_the_hinge_loss(weight):
         margins = sign * (features @ rule[:-1] + rule[-1])
         return rule @ rule / 2 + constant * (costs * np.maximum(0, 1 - margins)).sum()
 
-    found = np.array([*fitted.linear.weights[0], *fitted.linear.intercepts])
+    found = np.array([*fitted.rule.weights[0], *fitted.rule.intercepts])
     best = minimize(objective, found, method="Nelder-Mead", options={"maxiter": 4000}).fun
     assert objective(found) <= 1.001 * best
 
@@ -187,7 +187,7 @@ def test_svm_probability_rises_with_the_decision_even_where_there_is_nothing_to_
     rng = np.random.default_rng(0)
     given = Samples(rng.normal(size=(300, 2)), rng.random(300) < 0.4, np.arange(300) % 5)
     fitted = recipe("svm").fit(given, RECIPES["svm"].reference, 0)
-    assert fitted.linear.slope > 0
+    assert fitted.rule.slope > 0
     assert fitted.probability(given.features).mean() == pytest.approx(
         given.positive.mean(), abs=0.05
     )

@@ -13,7 +13,7 @@ SHOWN = {
     "record": "--seconds --object --case --note --set --camera --force --json",
     "play": "--host --port --speed --once --json",
     "import": "--format --sensor --columns --no-labels --suffix --jobs --force --json",
-    "label": "--tare --poses --track --video --author --browser --json",
+    "label": "--tare --poses --track --author --browser --json",
     "teach": "--output --from --camera --to --resume --unattended --page --model --false-alarms "
     "--jobs --force --in-contact --json",
     "train": "--output --classifier --features --split --trials --own-slip-features --init --for "
@@ -30,8 +30,6 @@ SHOWN = {
     "trial": "--out --laws --model --quick --n --plant --impacts --jobs --force --json",
     "study": "--out --twin --quick --full --jobs --tare --benchmark --force --json",
     "label auto": "--tare --poses --track --video --author --dry-run --force --json",
-    "label compare": "--annotator --json",
-    "label audit": "--page --author --json",
 }
 """Options that the help of a verb shows; that of all other verbs shows all."""
 

@@ -17,7 +17,6 @@ OTHER_MEANING = {
     "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",
     "--seconds": "record until it is stopped, and a minute of handling",
-    "--page": "the protocol of teach, and contradicted labels",
     "--resume": "a search of train, and the protocol of teach",
     "--sensor": "of a CSV file, and of the fingers of an exported model",
     "--set": "metadata of a recording, and parameters of a rule",
@@ -68,8 +67,7 @@ def test_jobs_have_one_default_in_every_verb():
         if "--jobs" in {flag for flag, _ in declarations(app.load_verb(name))}
     }
     assert set(defaults) == {
-        "import", "label", "label audit", "train", "evaluate", "teach", "simulate", "trial",
-        "study",
+        "import", "train", "evaluate", "teach", "simulate", "trial", "study",
     }  # fmt: skip
     assert set(defaults.values()) == {DEFAULT_JOBS}
 

@@ -19,7 +19,6 @@ from detector.build import (
     tactile,
     z_of,
 )
-from holdfast.classifiers import Onnx
 from holdfast.detector import Detector, detect
 from holdfast.errors import ModelError
 from holdfast.live.stream_detector import StreamDetector
@@ -228,9 +227,3 @@ def test_a_threshold_needs_its_head():
     handling = {"x": replace(HANDLING, location=(0.0,) * 15, scale=(1.0,) * 15)}
     with pytest.raises(ModelError, match="a threshold of slip given for 'x'; no such head"):
         finger_model(RICH, normalised=True, handling=handling)
-
-
-def test_other_classifiers_are_not_normalised():
-    network = Onnx.of(b"onnx", len(RICH))
-    with pytest.raises(ModelError, match="a linear classifier expected where features are"):
-        finger_model(RICH, rule=network, normalised=True)

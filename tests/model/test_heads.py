@@ -1,5 +1,6 @@
 """Heads of a finger: what is refused, and what a rule and its link make of the features."""
 
+import json
 import math
 
 import pytest
@@ -17,17 +18,18 @@ from detector.build import (
     squared_head,
     stable_head,
 )
-from holdfast.classifiers import Linear, Onnx
+from holdfast.classifiers import Linear
 from holdfast.contact import CAUSES, Cause
 from holdfast.detector.tables import rules_of
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
 from holdfast.model import ANY_FINGER, FingerModel, Model
+from holdfast.model.files import encode
 from holdfast.model.heads import HEAD_NAMES, Head
+from holdfast.removed import LAST_COMMIT, REMOVED
 
 STABLE, SLIP = stable_head(SLIP_OWN), squared_head(SLIP_OWN)
 SPEED, CAUSE = speed_head(SLIP), cause_head(SLIP_OWN)
-NETWORK = Onnx.of(b"not read", 3)
 SQUARES = ((0.0, 0.0, 0.0),)
 
 
@@ -51,9 +53,6 @@ SQUARES = ((0.0, 0.0, 0.0),)
          "stable: a rule without squares expected"),
         (CAUSE, {"rule": replace(CAUSE.rule, squares=SQUARES * 2)},
          "cause: a rule without squares expected"),
-        (SLIP, {"rule": NETWORK}, "slip: a linear rule expected, an ONNX file given"),
-        (SPEED, {"rule": NETWORK}, "slip_speed: a linear rule expected, an ONNX file given"),
-        (CAUSE, {"rule": NETWORK}, "cause: a linear rule expected, an ONNX file given"),
         (STABLE, {"rule": CAUSE.rule}, "stable: a rule of 1 output expected, 2 given"),
         (CAUSE, {"rule": linear(3)}, "cause: a rule of 2 outputs expected, 1 given"),
         (CAUSE, {"classes": (Cause.SLIP,) * 2},
@@ -86,12 +85,17 @@ def test_fields_that_contradict_each_other_are_refused(head, changes, message):
     assert str(raised.value) == message
 
 
-def test_a_head_of_onnx_is_not_linear():
-    head = replace(STABLE, rule=NETWORK)
+def test_a_head_of_onnx_is_refused_with_what_to_use_instead(tmp_path):
+    fields = json.loads(encode(Model(fingers={ANY_FINGER: finger_model()})))
+    head = fields["fingers"][ANY_FINGER]["heads"][0]
+    head["rule"] = {"type": "onnx", "file": "a.onnx", "sha256": "0" * 64, "n_features": 3}
+    path = tmp_path / "model.json"
+    path.write_text(json.dumps(fields))
     with pytest.raises(ModelError) as raised:
-        head.linear  # noqa: B018
-    assert str(raised.value) == f"stable: a linear rule expected, {NETWORK.file} given"
-    assert STABLE.linear is STABLE.rule
+        Model.load(path)
+    assert str(raised.value).startswith(f"{path}: the ONNX classifier of this model was removed")
+    assert LAST_COMMIT in str(raised.value)
+    assert str(raised.value).endswith(REMOVED["rules"]["onnx"])
 
 
 @pytest.mark.parametrize(

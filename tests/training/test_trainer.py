@@ -124,7 +124,7 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
             fit = recipe("logreg").fit(samples, parameters, seed)
             calls.append(len(samples.positive))
             number = len(calls) - 1  # two fingers of the whole, then two of each fold
-            rule = Linear.of(*fit.linear.moments, np.zeros(3), 0.1 * number)
+            rule = Linear.of(*fit.rule.moments, np.zeros(3), 0.1 * number)
             return Fitted(rule, 0.5)
 
     monkeypatch.setattr(Setting, "recipe_of", lambda self, finger: Marked())

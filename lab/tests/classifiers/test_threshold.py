@@ -96,7 +96,7 @@ def test_the_best_feature_is_taken_and_the_first_of_equals():
     stable = np.arange(60) % 2 == 0
     good = stable + rng.normal(size=60) * 0.1
     fitted = fit(samples(np.column_stack([rng.normal(size=60), good, 2 * good, good]), stable))
-    assert [c != 0 for c in fitted.linear.weights[0]] == [False, True, False, False]
+    assert [c != 0 for c in fitted.rule.weights[0]] == [False, True, False, False]
 
 
 def test_the_lowest_of_equal_cuts_is_taken():

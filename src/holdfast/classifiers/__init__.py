@@ -8,12 +8,10 @@ from holdfast.classifiers.fitting import (
     ModelRecipe,
     Parameters,
     Recipe,
-    Rule,
     Samples,
 )
 from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.logreg import Adapted, LogisticRegression
-from holdfast.classifiers.onnx_classifier import Onnx
 from holdfast.classifiers.svm import LinearSVM
 from holdfast.plugins import PluginGroup
 
@@ -26,10 +24,8 @@ __all__ = [
     "Fitted",
     "Linear",
     "ModelRecipe",
-    "Onnx",
     "Parameters",
     "Recipe",
-    "Rule",
     "Samples",
     "recipe",
     "recipe_names",

@@ -8,15 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers.linear import Linear
-from holdfast.classifiers.onnx_classifier import Onnx
 from holdfast.errors import TrainingError
 
 if TYPE_CHECKING:
     from optuna import Trial
 
 Parameters = Mapping[str, Any]
-Rule = Linear | Onnx
-"""What computes a head, and what a model file can store."""
 
 MIN_SLOPE = 1e-6
 """Minimum slope of a sigmoid: its probability rises, but is nearly the base rate."""
@@ -53,24 +50,13 @@ class Fitted(NamedTuple):
         threshold: probability from which on a sample is of class 1.
     """
 
-    rule: Rule
+    rule: Linear
     threshold: float = 0.5
 
     @property
     def n_features(self) -> int:
         """Number of features of its input."""
         return self.rule.n_features
-
-    @property
-    def linear(self) -> Linear:
-        """The rule, which must be linear.
-
-        Raises:
-            TrainingError: it is an ONNX file.
-        """
-        if not isinstance(self.rule, Linear):
-            raise TrainingError("a linear classifier expected, an ONNX file given")
-        return self.rule
 
     def probability(self, features: npt.ArrayLike) -> npt.NDArray[np.float64]:
         """Return the probability of class 1 of each row of (n, n_features); NaN if it has NaN."""

@@ -10,7 +10,6 @@ from holdfast.classifiers.fitting import (
     MIN_SLOPE,
     Fitted,
     Parameters,
-    Rule,
     Samples,
     check_classes,
     class_ratio,
@@ -19,7 +18,6 @@ from holdfast.classifiers.fitting import (
 )
 from holdfast.classifiers.linear import Linear
 from holdfast.classifiers.newton import Solution, fit_logistic
-from holdfast.errors import TrainingError
 
 if TYPE_CHECKING:
     from optuna import Trial
@@ -149,17 +147,6 @@ class Adapted:
         standardised = (samples.features - mean) / scale
         fitted = fit_logistic(standardised, positive, (1.0, 1.0), c, log_odds(prior))
         return Fitted(Linear.of(mean, scale, fitted.weights, fitted.intercept), self.threshold)
-
-
-def linear_prior(rule: Rule) -> Linear:
-    """Return the rule, which must be linear to be adapted.
-
-    Raises:
-        TrainingError: it is an ONNX file.
-    """
-    if not isinstance(rule, Linear):
-        raise TrainingError("a model with linear classifiers expected to adapt, an ONNX file given")
-    return rule
 
 
 def log_odds(prior: Linear) -> Solution:

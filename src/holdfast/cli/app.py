@@ -35,7 +35,7 @@ VERB_GROUPS = {
         "play": "Send a recording or the twin as a XELA server does.",
         "import": "Import recordings from other formats.",
         "info": "Show the content of a recording, a folder of them, or a model.",
-        "label": "Label recordings on a page or by a rule, and check labels.",
+        "label": "Label recordings on a page or by a rule.",
         "teach": "Teach a model the slips of your own hand.",
         "train": "Train a model from labelled recordings.",
         "evaluate": "Evaluate a model on labelled recordings.",
@@ -46,7 +46,7 @@ VERB_GROUPS = {
         "demo": "Detect on real and simulated recordings; train; replay live.",
         "simulate": "Simulate recordings of grasps with the physical twin.",
         "hold": "Control the grip force of a hand by the estimates of a source.",
-        "export": "Export a model as C or ONNX, or recordings to other tools.",
+        "export": "Export a model as C, or recordings to other tools.",
         "datasets": "List public recordings, download them and import them.",
         "sensors": "List the known sensors and hands, or show one of them.",
         "doctor": "Check the installation and the sources, or the modules of one.",
@@ -63,10 +63,8 @@ VERBS = {name: summary for verbs in VERB_GROUPS.values() for name, summary in ve
 """Verbs with the first line of their docstrings."""
 SUB_VERBS = {
     "label auto": "Write the labels that a rule proposes.",
-    "label compare": "Compare two sets of labels: kappa and differences of onsets.",
-    "label audit": "Find labels that a classifier contradicts.",
-    "label export": "Export labels to Label Studio, or as CSV.",
-    "label import": "Import labels from Label Studio, or CSV.",
+    "label export": "Export labels as CSV.",
+    "label import": "Import labels from CSV or other label files.",
     "label markers": "Print stickers by which a camera sees slips.",
 }
 """Commands of verbs, with the first line of their docstrings; for `label auto`,

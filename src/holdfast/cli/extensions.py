@@ -111,7 +111,6 @@ PLUGIN_GROUPS = {
     "sensors": ("sensors", "SENSOR_PLUGINS"),
     "sources": ("devices.uri", "SOURCE_PLUGINS"),
     "importers": ("io.importers", "IMPORTER_PLUGINS"),
-    "labels": ("labelling.exchange.read_labels", "LABEL_PLUGINS"),
     "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
     "verbs": ("cli.app", "VERB_PLUGINS"),
     "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),

@@ -14,7 +14,6 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
-from holdfast.classifiers import Linear, Onnx
 from holdfast.contact import (
     ContactEvent,
     HandEstimate,
@@ -33,11 +32,11 @@ from holdfast.features.start import Start, declared_baselines
 from holdfast.features.stream import FeatureStream
 from holdfast.features.tables import StreamPlan
 from holdfast.kernel import _extension
-from holdfast.model import FingerModel, Model
+from holdfast.model import Model
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array, Flags
+from holdfast.sensors.types import Array
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
 HAND = "hand"
@@ -160,7 +159,6 @@ class Detector:
             stream.tables(), self._settings, *self._rules,
             makers(stream.plan.fingers, self._parts), ndarray, self._transitions.append,
         )  # fmt: skip
-        self._feeder = None if _are_linear(self._parts) else OnnxFeeder(self._parts, stream)
 
     def __getstate__(self) -> object:
         # A copy would share the memory of the kernel with this one.
@@ -232,17 +230,17 @@ class Detector:
                 with own handling.
 
         Raises:
-            ModelError: the model has other features or another debouncing, or a classifier that
-                is not linear; nothing has changed then.
+            ModelError: the model has other features or another debouncing; nothing has changed
+                then.
         """
         plan = self._stream.plan
         # The features first: rules over other features cannot be compared.
         features = {name: model.finger(name).features for name in plan.sensors}
         parts = [model.finger(*finger) for finger in plan.sensors.items()]
-        if self._feeder is not None or not _are_linear(parts) or features != dict(plan.features):
+        if features != dict(plan.features):
             raise ModelError(
-                f"{model.name or 'the model'} has other features than the model of the detector, "
-                "or a classifier that is not linear; open the source again with it"
+                f"{model.name or 'the model'} has other features than the model of the detector; "
+                "open the source again with it"
             )
         settings, rules = tables.model_table(model, plan), tables.rules_of(model, plan)
         if settings != self._settings or tables.shapes(rules) != tables.shapes(self._rules):
@@ -268,17 +266,14 @@ class Detector:
             StreamError: an unknown finger, another number of taxels or axes, what is no number,
                 or a time that does not increase. The detector has not changed then.
         """
-        if self._feeder is None:
-            # None for what is converted or refused here: other types, shapes, names or times.
-            estimate = self._kernel.update(samples, time)
-            if estimate is not None:
-                return estimate
+        # None for what is converted or refused here: other types, shapes, names or times.
+        estimate = self._kernel.update(samples, time)
+        if estimate is not None:
+            return estimate
         # The time first: `_store` changes the memory for samples, which a wrong time must not.
         time = float(time)
         self._check_time(time)
         self._store(samples)
-        if self._feeder is not None:
-            self._kernel.give(self._feeder.log_odds(self._readings, self._present, time))
         return self._kernel.step(self._readings, self._present, time)
 
     def events(self) -> list[ContactEvent]:
@@ -321,16 +316,7 @@ class Detector:
         for times, present, readings in self._stream.samples_of(recording):
             estimates, numbers = tables.estimate_rows(*present.shape)
             hand = np.empty(len(times))
-            if self._feeder is None:
-                self._kernel.run(readings, present, times, numbers, hand)
-            else:
-                # One by one: the log odds of a sample depend on the features up to it.
-                for k, time in enumerate(times.tolist()):
-                    self._kernel.give(self._feeder.log_odds(readings[k], present[k], time))
-                    row = slice(k, k + 1)
-                    self._kernel.run(
-                        readings[row], present[row], times[row], numbers[row], hand[row]
-                    )
+            self._kernel.run(readings, present, times, numbers, hand)
             codes = np.column_stack([estimates["state"], hand.astype(np.int64)])
             self._events += self._changes.update_chunk(times, codes)
             yield Chunk(times, present, estimates, hand)
@@ -413,11 +399,6 @@ def check_thresholds(thresholds: Mapping[str, float]) -> None:
             raise ValueError(f"a threshold from 0 to 1 expected, {threshold} given")
 
 
-def _are_linear(parts: Sequence[FingerModel]) -> bool:
-    """Return whether no finger has an ONNX file as its classifier."""
-    return all(isinstance(part.stable.rule, Linear) for part in parts)
-
-
 def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
     """Return the plan without some taxels."""
     for finger, taxels in (ignore or {}).items():
@@ -433,40 +414,3 @@ def _ignoring(plan: StreamPlan, ignore: IgnoredTaxels | None) -> StreamPlan:
                     f"it has the indices 0 to {n_taxels - 1}"
                 )
     return replace(plan, ignore=ignore or {})
-
-
-class OnnxFeeder:
-    """Feeder of a kernel with the log odds of ONNX files, which Python computes for each sample.
-
-    It computes the features once more, in a stream of its own: an update takes as long as the
-    classifier.
-
-    Args:
-        parts: models of the fingers of the stream, in its order.
-        stream: of the detector.
-    """
-
-    def __init__(self, parts: Sequence[FingerModel], stream: FeatureStream) -> None:
-        self._kernel = stream.start()
-        self._features = np.empty((1, len(parts), stream.plan.width))
-        self._amplitude = np.empty((1, len(parts)))
-        self._log_odds = np.zeros(len(parts))  # of the latest sample of each finger
-        self._rules = {
-            place: (part.indices(part.stable), part.stable.rule)
-            for place, part in enumerate(parts)
-            if isinstance(part.stable.rule, Onnx)
-        }
-
-    def log_odds(self, readings: Array, present: Flags, time: float) -> Array:
-        """Return (n_fingers,) the log odds of stability of a sample; see `Detector.update`."""
-        self._kernel.advance(
-            readings[None], present[None], np.array([time]), self._features, self._amplitude
-        )
-        for place, (columns, onnx) in self._rules.items():
-            features = self._features[:, place, columns]
-            if present[place] and not np.isnan(features).any():  # NaN: the finger has none
-                probability = onnx.probability(features)[0]
-                # A probability of 0 or 1 is an infinite logit, which the kernel accepts.
-                with np.errstate(divide="ignore"):
-                    self._log_odds[place] = np.log(probability / (1.0 - probability))
-        return self._log_odds

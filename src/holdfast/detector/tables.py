@@ -3,7 +3,6 @@
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Linear
 from holdfast.contact import CAUSES, SLIP_CODE
 from holdfast.features.tables import StreamPlan, Struct
 from holdfast.model import FingerModel, Head, Model
@@ -96,8 +95,6 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     """
     if head is None:
         return np.zeros((0, 1)), np.zeros((0, 0)), []
-    if not isinstance(head.rule, Linear):
-        return np.zeros((1, 1)), np.zeros((0, 0)), []  # its z is given from outside
     columns = part.indices(head)
     # A head reads the features up to the last that it uses; those of slips read all.
     is_slip = head.name in ("slip", "slip_speed")

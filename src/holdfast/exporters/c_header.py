@@ -20,7 +20,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from holdfast.classifiers import Linear
 from holdfast.contact import Fault, Reason
 from holdfast.detector.tables import model_table, rules_of
 from holdfast.errors import ModelError
@@ -256,12 +255,6 @@ def header_of(
         ModelError: a part of the model has no form as C, or the fingers do not fit.
     """
     sensors = model.fingers_of(fingers)
-    for name, sensor in sensors.items():
-        if not isinstance(model.finger(name, sensor).stable.rule, Linear):
-            raise ModelError(
-                f"the classifier of {name} is an ONNX file, which has no form as C; a header "
-                "holds linear classifiers (logistic regression, linear SVM) with all the rest"
-            )
     plan = replace(model.plan(sensors, rate), start=start, ignore=ignore or {})
     if plan.tare.kind == "interval":
         raise ModelError(

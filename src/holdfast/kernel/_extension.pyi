@@ -133,9 +133,6 @@ class Detector:
     ) -> None:
         """Change rules and heads from the next sample on."""
 
-    def give(self, log_odds: npt.NDArray[np.float64], /) -> None:
-        """Set the log odds of stability (n_fingers,) of fingers without a linear classifier."""
-
     def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:
         """Fill (n_taxels, 3) with the tare, and return whether that of each finger is complete."""
 

@@ -427,26 +427,6 @@ static PyObject *set_rules_alone(detector *s, PyObject *const *args, Py_ssize_t 
     return Py_NewRef(Py_None);
 }
 
-/* give(log_odds): z of the head `stable` of the next sample, where its classifier is not linear. */
-static PyObject *give_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
-{
-    if (check_count(n_args, 1) < 0) {
-        return NULL;
-    }
-    array log_odds = {0};
-    PyObject *result = NULL;
-    const size_t n = s->base.hand.n_fingers;
-    if (get_array('d', args[0], "log_odds", 1, PyBUF_SIMPLE, &log_odds) == 0 &&
-        check_shape(&log_odds, SHAPE((Py_ssize_t)n)) == 0) {
-        for (size_t i = 0; i < n; ++i) {
-            s->d.decisions[i].given = log_odds.data[i];
-        }
-        result = Py_NewRef(Py_None);
-    }
-    PyBuffer_Release(&log_odds.view);
-    return result;
-}
-
 /* baselines(out): fill (n_taxels, 3) and return for each finger whether its tare is complete. */
 static PyObject *baselines_alone(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
@@ -489,7 +469,6 @@ ALONE(update)
 ALONE(step)
 ALONE(run)
 ALONE(set_rules)
-ALONE(give)
 ALONE(baselines)
 
 #define METHOD(name)                                                                               \
@@ -498,8 +477,8 @@ ALONE(baselines)
     }
 
 static PyMethodDef detector_methods[] = {
-    METHOD(update), METHOD(step),      METHOD(run),       METHOD(set_rules),
-    METHOD(give),   METHOD(baselines), METHOD(last_time), {NULL, NULL, 0, NULL},
+    METHOD(update),    METHOD(step),      METHOD(run),           METHOD(set_rules),
+    METHOD(baselines), METHOD(last_time), {NULL, NULL, 0, NULL},
 };
 
 static PyType_Slot detector_slots[] = {

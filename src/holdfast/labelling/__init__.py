@@ -1,1 +1,1 @@
-"""Labels: proposed by rules, drawn by people, reviewed, exchanged with other programs."""
+"""Labels: proposed by rules, drawn by people, reviewed, and written as CSV."""

@@ -1,6 +1,6 @@
 """Recordings to label, by their paths, and the label files that are written beside them."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -10,17 +10,17 @@ import msgspec
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.io import labels_to_csv, load_dataset, load_recording
-from holdfast.io.label_files import SUFFIX, labels_for, labels_path, load_labels
+from holdfast.io.header import label_of
+from holdfast.io.label_files import SUFFIX, labels_for, labels_from_csv, labels_path, load_labels
 from holdfast.io.recording_files import SUFFIXES
-from holdfast.labelling.review.compare import Agreement, RecordingAgreement, compare, pool
+from holdfast.labelling.review.confidence import doubtful, state_name
 from holdfast.labelling.review.content import label_seconds
-from holdfast.labelling.review.spans import doubtful, state_name
-from holdfast.labelling.rules import RULES
 from holdfast.labelling.rules.forces import evidence_of_contact
 from holdfast.labelling.server.documents import labels_data
 from holdfast.labelling.server.store import ModuleLabels, revision_of, save_stored
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.recordings import Recording
+from holdfast.removed import removal
 
 LabelsOf = Callable[[Recording, Path], ModuleLabels]
 """Function that returns the labels of a recording, from it and its path."""
@@ -48,83 +48,76 @@ def recordings_at(paths: Sequence[Path]) -> list[Path]:
     return list(dict.fromkeys(files))
 
 
-def recordings_beside(place: Path) -> list[Path]:
-    """Return the recordings in a folder, at a path, or beside a label file; may be none.
+def read_labels(path: Path, recording: Recording) -> ModuleLabels:
+    """Read the labels of a recording from a file, or from a file in a folder.
 
-    Raises:
-        RecordingError: a label file cannot be read.
-    """
-    if place.is_dir():
-        try:
-            return list(load_dataset(place).paths)
-        except RecordingError:
-            return []
-    if place.suffix in SUFFIXES:
-        return [place]
-    stems = [place.stem]
-    if place.name.endswith(SUFFIX):
-        stems = [place.name.removesuffix(SUFFIX), load_labels(place).name]
-    beside = [place.with_name(stem + suffix) for stem in stems for suffix in SUFFIXES]
-    return [path for path in beside if path.is_file()][:1]
-
-
-def is_rule(place: Path) -> bool:
-    """Return whether a path is the name of a rule, and no file."""
-    return str(place) in RULES and not place.exists()
-
-
-def recordings_to_compare(a: Path, b: Path) -> list[Path]:
-    """Return the recordings to compare: those in A, otherwise those in B.
+    A file is a label file (`.labels.json`), a recording with labels inside or beside it
+    (`.parquet`, `.mcap`) or a table (`.csv`). In a folder it is the first that exists of
+    `NAME.labels.json`, `NAME.parquet`, `NAME.mcap`, `NAME.labels.csv` and `NAME.csv`.
 
     Args:
-        a: files or folders of labels or recordings, or a rule.
-        b: likewise.
+        path: of the file or folder.
+        recording: the recording.
+
+    Returns:
+        By finger, in order of time; fingers without labels are left out.
 
     Raises:
-        RecordingError: there are none.
-        ValueError: both are rules.
+        RecordingError: there are no labels, they are of another recording or do not fit it, or
+            the file cannot be read.
     """
-    places = [place for place in (a, b) if not is_rule(place)]
-    if not places:
-        raise ValueError(f"rules {a} and {b} given; A or B must be recordings or labels")
-    for place in places:
-        if not place.exists():
-            raise RecordingError(f"{place} does not exist; labels, recordings or a rule expected")
-    for place in places:
-        if files := recordings_beside(place):
-            return files
+    file = path
+    if file.is_dir():
+        # The label file first: it outranks what is inside a recording, as when one is loaded.
+        stem, endings = file_stem(recording.name), (SUFFIX, *SUFFIXES, ".labels.csv", ".csv")
+        found = [at for ending in endings if (at := path / f"{stem}{ending}").is_file()]
+        if not found:
+            raise RecordingError(
+                f"no labels of {recording.name!r} in {path}; "
+                f"{stem} with one of {', '.join(endings)} expected"
+            )
+        file = found[0]
+    labels = _read(file, recording)
+    try:
+        validated = recording.with_labels(labels)
+    except RecordingError as cause:
+        raise RecordingError(f"{file}: {cause}") from cause
+    return {name: module.labels for name, module in validated.modules.items() if module.labels}
+
+
+def _read(file: Path, recording: Recording) -> ModuleLabels:
+    if file.suffix in SUFFIXES:
+        other = load_recording(file)
+        _check_digest(file, other.digest, other.name, recording)
+        return {name: module.labels for name, module in other.modules.items()}
+    if file.suffix == ".csv":
+        return labels_from_csv(file)
+    if file.suffix == ".json":
+        try:
+            labels = load_labels(file)
+        except RecordingError as cause:
+            # Any other JSON may be of Label Studio.
+            if file.name.endswith(SUFFIX) or not isinstance(cause.__cause__, msgspec.DecodeError):
+                raise
+            removed = removal("labels", "label-studio", "the format label-studio")
+            raise RecordingError(f"{cause}; {removed}") from cause
+        _check_digest(file, labels.recording, labels.name, recording)
+        try:
+            return {name: tuple(map(label_of, own)) for name, own in labels.modules.items()}
+        except ValueError as cause:
+            raise RecordingError(f"{file}: {cause}") from cause
     raise RecordingError(
-        f"no recordings beside the labels in {a} or {b}; recordings give the sample times"
+        f"cannot read labels from {file}: {file.suffix or 'no suffix'} given; {SUFFIX}, "
+        f".csv, {' or '.join(SUFFIXES)} expected"
     )
 
 
-def compare_files(
-    files: Iterable[Path], labels_of_a: LabelsOf, labels_of_b: LabelsOf
-) -> tuple[Agreement, dict[str, str]]:
-    """Return the agreement of A and B, and why recordings are left out, by their names.
-
-    Raises:
-        RecordingError: all recordings are left out.
-    """
-    compared: dict[str, RecordingAgreement] = {}
-    left_out: dict[str, str] = {}
-    for path in files:
-        try:
-            recording = load_recording(path, labels=False)
-            a, b = labels_of_a(recording, path), labels_of_b(recording, path)
-            if any(a.values()) and any(b.values()):
-                times = {name: module.times for name, module in recording.modules.items()}
-                compared[recording.name] = compare(a, b, times, recording.name)
-            else:
-                side = "B" if any(a.values()) else "A"
-                left_out[recording.name] = f"{side} has no labels of this recording"
-        except RecordingError as cause:
-            left_out[path.stem] = str(cause)
-    if not compared:
-        name, text = next(iter(left_out.items()))
-        more = f" (and {len(left_out) - 1} other recordings)" if len(left_out) > 1 else ""
-        raise RecordingError(f"nothing to compare: {name}: {text}{more}")
-    return pool([*compared.values()]), left_out
+def _check_digest(file: Path, digest: str, name: str, recording: Recording) -> None:
+    if digest != recording.digest:
+        raise RecordingError(
+            f"{file} labels another recording ({name!r}, hash {digest[:12]}) than "
+            f"{recording.name!r} (hash {recording.digest[:12]})"
+        )
 
 
 def check_no_manual_labels(files: Sequence[Path]) -> None:

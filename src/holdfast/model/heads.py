@@ -5,7 +5,7 @@ from typing import Literal
 
 import msgspec
 
-from holdfast.classifiers import Linear, Onnx, Rule
+from holdfast.classifiers import Linear
 from holdfast.contact import Cause
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
@@ -82,7 +82,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         name: what it answers: `stable`, `slip` (the finger slides), `slip_speed` or `cause`.
         link: `logit`, `square` or `softmax`.
         features: input of the rule, in its order.
-        rule: maps features to z; an ONNX file to p.
+        rule: maps features to z.
         threshold: of the probability, for the link `logit`. One of 1 never reports a slip: the
             probability is only a ranking then.
         smoothing: time constant of z [s]; 0 for none.
@@ -98,7 +98,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     name: HeadName
     link: Link
     features: tuple[FeatureSpec, ...]
-    rule: Rule
+    rule: Linear
     threshold: float = 0.5
     smoothing: float = 0.0
     hold: float = 0.0
@@ -152,11 +152,6 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
                 )
         elif self.classes:
             raise ModelError(f"{self.name}: no classes expected, {n_classes} given")
-        # The kernel takes z of one head from outside: that of stability.
-        if isinstance(self.rule, Onnx):
-            if self.name != "stable":
-                raise ModelError(f"{self.name}: a linear rule expected, an ONNX file given")
-            return
         n_outputs = max(n_classes, 1)
         if self.rule.n_outputs != n_outputs:
             raise ModelError(
@@ -165,17 +160,6 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
             )
         if self.rule.squares and self.name not in ("slip", "slip_speed"):
             raise ModelError(f"{self.name}: a rule without squares expected")
-
-    @property
-    def linear(self) -> Linear:
-        """The rule, which must be linear.
-
-        Raises:
-            ModelError: it is an ONNX file.
-        """
-        if not isinstance(self.rule, Linear):
-            raise ModelError(f"{self.name}: a linear rule expected, {self.rule.file} given")
-        return self.rule
 
     def gain(self, rate: float) -> float:
         """Return the share of a new sample in the smoothed z at a rate [Hz]."""
@@ -188,6 +172,6 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     def normalised_by(self, location: Array, scale: Array) -> "Head":
         """Return the head with another location and scale of each feature in its rule."""
         rule = msgspec.structs.replace(
-            self.linear, mean=tuple(location.tolist()), scale=tuple(scale.tolist())
+            self.rule, mean=tuple(location.tolist()), scale=tuple(scale.tolist())
         )
         return msgspec.structs.replace(self, rule=rule)

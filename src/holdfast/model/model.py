@@ -105,8 +105,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
         Raises:
             ModelError: the file or name does not exist; the file is not JSON; it has an unknown
-                field, another shape, a number that is not finite, or another schema; an ONNX
-                file that it names is missing, too large or another.
+                field, another shape, a number that is not finite, or another schema.
         """
         # Fields, not the object: a subclass that loads a built-in model gets its own type.
         if str(path).startswith("builtin:"):
@@ -114,9 +113,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         return read_model(path, cls)
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
-        """Write the model as JSON, and its ONNX files beside it: all of them or none.
-
-        With `force`, ONNX files of a model that is replaced are deleted.
+        """Write the model as JSON.
 
         Raises:
             OutputError: the file exists and `force` is not given, or it cannot be written.

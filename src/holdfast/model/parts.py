@@ -5,7 +5,6 @@ import math
 import msgspec
 import numpy as np
 
-from holdfast.classifiers import Linear
 from holdfast.errors import ModelError
 from holdfast.features import FeatureSpec
 from holdfast.model.heads import HEAD_NAMES, Head, HeadName
@@ -105,9 +104,6 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         self._check_handling()
 
     def _check_handling(self) -> None:
-        # Own handling replaces means and scales, which an ONNX file hides.
-        if self.normalised and not isinstance(self.stable.rule, Linear):
-            raise ModelError("a linear classifier expected where features are normalised")
         if self.handling and not self.normalised:
             raise ModelError("own handling given; it needs a model with normalised features")
         check_limit("sensors with own handling", len(self.handling), MAX_FINGERS)
@@ -164,7 +160,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
         # `stable` last: where both use a feature, its moments count.
         for head in (self.slip, self.stable):
-            if head is not None and isinstance(head.rule, Linear):
+            if head is not None:
                 location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
         return location, scale
 
@@ -184,17 +180,15 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         after = np.array(handling.location), np.array(handling.scale)
         heads = []
         for head in self.heads:
-            if isinstance(head.rule, Linear):
-                columns = self.indices(head)
-                location, scale = after[0][columns], after[1][columns]
-                if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
-                    mean, own_scale = head.rule.moments
-                    ratio = scale / before[1][columns]
-                    location = location + ratio * (mean - before[0][columns])
-                    scale = ratio * own_scale
-                head = head.normalised_by(location, scale)  # noqa: PLW2901
+            columns = self.indices(head)
+            location, scale = after[0][columns], after[1][columns]
+            if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
+                mean, own_scale = head.rule.moments
+                ratio = scale / before[1][columns]
+                location = location + ratio * (mean - before[0][columns])
+                scale = ratio * own_scale
             threshold = handling.thresholds.get(head.name, head.threshold)
-            heads.append(head if threshold == head.threshold else head.at(threshold, head.choice))
+            heads.append(head.normalised_by(location, scale).at(threshold, head.choice))
         return msgspec.structs.replace(self, heads=tuple(heads), handling={})
 
     def without_thresholds(self, name: HeadName) -> "FingerModel":

@@ -78,12 +78,12 @@ def fit_slip(
         # The classifier of [u, min(|u|, 5)^2], with u = (phi - mean) / scale, in terms of phi.
         mean, scale, standard = standardise(classes.features)
         wide = np.hstack([standard, np.minimum(np.abs(standard), MAX_DEVIATION) ** 2])
-        fitted = recipe.fit(classes._replace(features=wide), parameters, 0).linear
+        fitted = recipe.fit(classes._replace(features=wide), parameters, 0).rule
         weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
         intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
         rule = Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
     else:
-        rule = recipe.fit(classes, parameters, 0).linear
+        rule = recipe.fit(classes, parameters, 0).rule
     # The odds of sliding fall by the still samples that were left out.
     n_still = samples.n_usable - samples.n_positive
     thinning = np.log(n_still / (len(samples.values) - samples.n_positive))

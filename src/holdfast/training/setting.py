@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 from holdfast.classifiers import Adapted, ModelRecipe, recipe
-from holdfast.classifiers.logreg import linear_prior
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
 from holdfast.features.haar import check_window
@@ -142,7 +141,7 @@ class Setting:
         """
         if self.init is not None:
             stable = self.init.finger(finger).stable
-            return Adapted(linear_prior(stable.rule), stable.threshold)
+            return Adapted(stable.rule, stable.threshold)
         return recipe(self.classifier)
 
     @property

@@ -380,7 +380,7 @@ def _fitted(samples: TargetSamples, left_out: Collection[int]) -> Head:
     # Each fit with its own odds, so that the thresholds of the folds mean the same: with few slips
     # the probabilities would leave the grid of thresholds, whose lowest is 0.018.
     odds = math.log((samples.n_usable - samples.n_positive) / samples.n_positive)
-    rule = msgspec.structs.replace(head.linear, offset=head.linear.offset + odds)
+    rule = msgspec.structs.replace(head.rule, offset=head.rule.offset + odds)
     return msgspec.structs.replace(head, rule=rule)
 
 

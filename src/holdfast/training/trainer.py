@@ -8,7 +8,6 @@ from typing import NamedTuple, Self
 import msgspec
 
 from holdfast.classifiers import Parameters, Samples
-from holdfast.classifiers.logreg import linear_prior
 from holdfast.features import FeatureSpec
 from holdfast.metrics import (
     Decisions,
@@ -309,7 +308,7 @@ class _Trainer:
         if init is not None:
             for left_out, parameters_of in zip(left_out_units, found, strict=True):
                 for finger, pool in self.fingers.items():
-                    prior = linear_prior(init.finger(finger).stable.rule)
+                    prior = init.finger(finger).stable.rule
                     adaptation = choose_adaptation(pool, prior, left_out)
                     parameters_of[finger] = adaptation.parameters
                     if not left_out:  # the final model: the one that the user gets

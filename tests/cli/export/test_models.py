@@ -32,12 +32,6 @@ def test_json_has_the_sizes(capsys, tmp_path):
     assert (document["code_size"] is None) == (shutil.which("cc") is None)
 
 
-def test_onnx(capsys, tmp_path):
-    pytest.importorskip("onnx", reason="onnx is not installed")
-    code, out, _ = run(capsys, "builtin:twin", tmp_path / "model.onnx")
-    assert code == 0 and out.endswith("outputs any_stable, any_slip\n")
-
-
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -45,6 +39,7 @@ def test_onnx(capsys, tmp_path):
         (("builtin:any", "model.h", "--sensor", "gtac"), "either --like RECORDING or both"),
         (("builtin:any", "model.h", "--like", "none.parquet"), "none.parquet"),
         (("builtin:any", "model.c", "--sensor", "gtac", "--fingers", "1"), "exported as .h"),
+        (("builtin:any", "model.onnx"), "after 0.3.0 (commit f7d623e5 has it): holdfast export"),
         (("builtin:none", "model.h"), "unknown model 'builtin:none'"),
     ],
 )

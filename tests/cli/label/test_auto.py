@@ -11,7 +11,7 @@ from .helpers import FINGERS, refusal, run, run_json, save_manual_labels
 
 
 def test_a_rule_labels_a_folder(capsys, folder):
-    found = run_json(capsys, "--auto", "signal", folder)
+    found = run_json(capsys, "auto", "signal", folder)
     assert (found["rule"], found["written"]) == ("signal", True)
     assert [each["name"] for each in found["recordings"]] == ["one", "two"]
     for each in found["recordings"]:
@@ -31,7 +31,7 @@ def test_a_rule_labels_a_folder(capsys, folder):
 
 
 def test_the_table_of_a_rule(capsys, folder):
-    code, out, err = run(capsys, "--auto", "signal", folder)
+    code, out, err = run(capsys, "auto", "signal", folder)
     assert code == 0
     header, one, two = out.splitlines()[:3]
     assert header.split() == [
@@ -53,7 +53,7 @@ def test_the_five_least_certain_labels_are_lines_of_80_columns(capsys, folder):
     }
     path = folder / "late.mcap"
     save_recording(Recording("late", modules), path)
-    code, out, _ = run(capsys, "--auto", "signal", path, "--dry-run")
+    code, out, _ = run(capsys, "auto", "signal", path, "--dry-run")
     assert code == 0
     lines = out.splitlines()
     place = next(k for k, line in enumerate(lines) if line.startswith("check these first, the"))
@@ -65,7 +65,7 @@ def test_the_five_least_certain_labels_are_lines_of_80_columns(capsys, folder):
 
 
 def test_hidden_labels_are_reported_before_anything_is_written(capsys, folder):
-    code, _, err = run(capsys, "--auto", "signal", folder, "--dry-run")
+    code, _, err = run(capsys, "auto", "signal", folder, "--dry-run")
     assert (code, err) == (
         0,
         "2 of 2 recordings came with labels; the label files would outrank them in train and "
@@ -82,7 +82,7 @@ class TestRecordingsThatBeginInContact:
         return folder
 
     def messages(self, capsys, folder, *words):
-        code, _, err = run(capsys, "--auto", "signal", folder, "--dry-run", *words)
+        code, _, err = run(capsys, "auto", "signal", folder, "--dry-run", *words)
         assert code == 0
         return err.splitlines()
 
@@ -90,10 +90,10 @@ class TestRecordingsThatBeginInContact:
         text = "1 of 2 recordings begin in contact (two: metadata: starts_loaded): "
         more = "; if the others do too, give --tare first"
         assert self.messages(capsys, held)[0] == f"{text}the first sample is their tare{more}"
-        (one, two) = run_json(capsys, "--auto", "signal", held, "--dry-run")["recordings"]
+        (one, two) = run_json(capsys, "auto", "signal", held, "--dry-run")["recordings"]
         assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
         (first,) = run_json(
-            capsys, "--auto", "signal", held / "two.mcap", "--dry-run", "--tare", "first"
+            capsys, "auto", "signal", held / "two.mcap", "--dry-run", "--tare", "first"
         )["recordings"]
         assert first["labels"] == two["labels"]
 
@@ -107,7 +107,7 @@ class TestRecordingsThatBeginInContact:
 
 def test_a_dry_run_writes_nothing(capsys, folder):
     before = sorted(folder.iterdir())
-    found = run_json(capsys, "--auto", "signal", folder, "--dry-run")
+    found = run_json(capsys, "auto", "signal", folder, "--dry-run")
     assert found["written"] is False
     assert found["recordings"][0]["labels"]["thumb"]
     assert sorted(folder.iterdir()) == before
@@ -115,28 +115,28 @@ def test_a_dry_run_writes_nothing(capsys, folder):
 
 def test_a_rule_may_label_again_but_not_over_a_person(capsys, folder):
     path = folder / "one.parquet"
-    run_json(capsys, "--auto", "signal", path)
-    run_json(capsys, "--auto", "signal", path, "--author", "rule:mine")
+    run_json(capsys, "auto", "signal", path)
+    run_json(capsys, "auto", "signal", path, "--author", "rule:mine")
     assert load_labels(labels_path(path)).author == "rule:mine"
     save_manual_labels(path)
     before = labels_path(path).read_bytes()
-    line = refusal(capsys, "--auto", "signal", folder)
+    line = refusal(capsys, "auto", "signal", folder)
     assert line == (
         f"{labels_path(path)}: labels of ada exist already; nothing was written: "
         "overwrite them with --force"
     )
     assert labels_path(path).read_bytes() == before
     assert not labels_path(folder / "two.mcap").exists()
-    run_json(capsys, "--auto", "signal", path, "--dry-run")
+    run_json(capsys, "auto", "signal", path, "--dry-run")
     assert labels_path(path).read_bytes() == before
-    run_json(capsys, "--auto", "signal", folder, "--force")
+    run_json(capsys, "auto", "signal", folder, "--force")
     file = load_labels(labels_path(path))
     assert (file.author, file.notes) == ("rule:signal", "careful")
 
 
 def test_recordings_that_a_rule_cannot_label_do_not_stop_the_others(capsys, folder):
     (folder / "cut.parquet").write_bytes((folder / "one.parquet").read_bytes()[:500])
-    code, out, err = run(capsys, "--auto", "signal", folder, "--json")
+    code, out, err = run(capsys, "auto", "signal", folder, "--json")
     assert code == 2
     first, *others = json.loads(out)["recordings"]
     assert "cut.parquet is cut or damaged" in first["error"]
@@ -146,13 +146,13 @@ def test_recordings_that_a_rule_cannot_label_do_not_stop_the_others(capsys, fold
 
 def test_parameters_of_a_rule(capsys, folder):
     path = folder / "one.parquet"
-    usual = run_json(capsys, "--auto", "signal", path, "--dry-run")
-    blunt = run_json(capsys, "--auto", "signal", path, "--dry-run", "--set", "share=0.9")
+    usual = run_json(capsys, "auto", "signal", path, "--dry-run")
+    blunt = run_json(capsys, "auto", "signal", path, "--dry-run", "--set", "share=0.9")
     assert blunt["recordings"][0]["seconds"] != usual["recordings"][0]["seconds"]
     poses = folder.parent / "poses.csv"
     rows = "".join(f"{k / 100},0,0,0,1,0,0,{1e-9 * (k % 2)}\n" for k in range(1200))
     poses.write_text("time,x,y,z,qw,qx,qy,qz\n" + rows)
-    found = run_json(capsys, "--auto", "tracking", path, "--poses", poses)
+    found = run_json(capsys, "auto", "tracking", path, "--poses", poses)
     assert found["recordings"][0]["seconds"]["stable"] > 1
 
 
@@ -160,7 +160,7 @@ def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
     path = folder / "one.parquet"
     save_labels(synthetic_recording("other", 5, FINGERS), path, author="rule:signal")
     before = labels_path(path).read_bytes()
-    for words in (("--auto", "signal", path), ("--auto", "signal", path, "--force")):
+    for words in (("auto", "signal", path), ("auto", "signal", path, "--force")):
         line = refusal(capsys, *words)
         assert "one.labels.json labels another recording ('other'" in line
     assert labels_path(path).read_bytes() == before
@@ -168,7 +168,7 @@ def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
 
 def test_a_read_only_label_file(capsys, folder):
     path = folder / "one.parquet"
-    run_json(capsys, "--auto", "signal", path)
+    run_json(capsys, "auto", "signal", path)
     labels_path(path).chmod(0o444)
-    line = refusal(capsys, "--auto", "signal", path)
+    line = refusal(capsys, "auto", "signal", path)
     assert line.endswith("one.labels.json cannot be written: it or its folder is read-only")

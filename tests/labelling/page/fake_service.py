@@ -79,7 +79,7 @@ class Recording:
         return {
             "id": index, "name": self.name, "start": 0.0, "end": self.end, "rate": RATE,
             "fingers": self.fingers, "unit": dict.fromkeys(self.fingers, "count"),
-            "suspects": [], "doubtful": [], "markers": [], "media": [], "read_only": False,
+            "doubtful": [], "markers": [], "media": [], "read_only": False,
             "revision": f"r{self.version}", **self.file, **self.fields,
         }  # fmt: skip
 
@@ -229,7 +229,7 @@ class FakeService:
 
 
 def example_recording():
-    """Return a recording with labels, proposals, a suspect and markers, to look at."""
+    """Return a recording with labels, proposals and markers, to look at."""
     shown = Recording("can-case2-1", markers=[(5.0, "closing"), (7.5, "locked")])
     for finger in FINGERS:
         shown.file["labels"][finger] = [label(0, 5, "no_contact"), label(5, 7.5, "unstable")]
@@ -237,10 +237,6 @@ def example_recording():
             label(7.5, 14, "stable", confidence=0.95, author="rule:signal", evidence="settled"),
             label(14, 16, "unstable", "disturbance", confidence=0.6, author="rule:signal"),
         ]
-    shown.fields["suspects"] = [
-        {"finger": "index", "start": 2.0, "end": 3.0, "given": "no_contact",
-         "expected": "unstable", "confidence": 0.93, "kind": "interval"},
-    ]  # fmt: skip
     return shown
 
 

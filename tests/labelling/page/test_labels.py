@@ -16,7 +16,7 @@ SESSION = """async ([operations]) => {
     proposals[fingers[k % 2]].push({ start: 3 * k + 0.5, end: 3 * k + 3.5, state: "stable",
                                      cause: null, evidence: "", confidence: k / 8, author: "r" });
   }
-  editor.open({ fingers, labels, proposals, suspects: [], start: 0, end: 30, rate: 100,
+  editor.open({ fingers, labels, proposals, start: 0, end: 30, rate: 100,
                 read_only: false }, "ada", []);
   const text = () => JSON.stringify([editor.state.labels, [...editor.state.rejected]]);
   const seen = [text()], bad = [];

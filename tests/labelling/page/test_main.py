@@ -282,21 +282,16 @@ def test_items_to_review_one_after_the_other(visit, service):
     recording = service.recordings[0]
     recording.save({"thumb": [label(2, 4, "stable", confidence=0.5), label(10, 14, "stable")]})
     recording.fields["proposals"] = {"index": [label(20, 21, "unstable", confidence=0.3)]}
-    recording.fields["suspects"] = [
-        {"finger": "thumb", "start": 11.0, "end": 12.0, "given": "stable",
-         "expected": "unstable", "confidence": 0.95, "kind": "interval"},
-    ]  # fmt: skip
     page = visit(service.url)
     ready(page)
-    shows(page, "#n-review-items", "^3$")
-    for text in ("audit expects unstable", "proposed: unstable", r"stable[\s\S]*50"):
+    shows(page, "#n-review-items", "^2$")
+    for text in ("proposed: unstable", r"stable[\s\S]*50"):
         page.keyboard.press("g")
         shows(page, "#item", text)
     page.keyboard.press("Enter")  # confirms the label of low confidence
-    shows(page, "#n-review-items", "^2$")
-    click(page, "thumb", 13)
-    page.keyboard.press("2")  # what the audit expects
     shows(page, "#n-review-items", "^1$")
+    click(page, "thumb", 13)
+    page.keyboard.press("2")
     page.keyboard.press("g")
     page.keyboard.press("x")
     shows(page, "#review-items", "^$")
@@ -305,33 +300,6 @@ def test_items_to_review_one_after_the_other(visit, service):
     assert [(each["state"], each["confidence"]) for each in thumb] == [
         ("stable", 1), ("unstable", 1),
     ]  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("suspect", "expected"),
-    [
-        (
-            (11.0, 12.0, "interval"),
-            [(8, 11, None), (11, 12, None), (12, 14, None), (14, 16, "slip")],
-        ),
-        ((13.5, 14.0, "edge"), [(8, 13.5, None), (13.5, 16, "slip")]),
-    ],
-)
-def test_a_label_is_corrected_as_the_audit_expects(visit, service, suspect, expected):
-    recording, (start, end, kind) = service.recordings[0], suspect
-    held, slips = label(8, 14, "stable"), label(14, 16, "unstable", "slip")
-    recording.save({"thumb": [held, slips]})
-    recording.fields["suspects"] = [
-        {"finger": "thumb", "start": start, "end": end, "given": "stable",
-         "expected": "unstable", "confidence": 0.95, "kind": kind},
-    ]  # fmt: skip
-    page = visit(service.url)
-    ready(page)
-    page.keyboard.press("g")
-    shows(page, "#item", "Enter corrects the label")
-    page.keyboard.press("Enter")
-    assert [(start, end, cause) for start, end, _, cause in labels(page)] == expected
-    shows(page, "#review-items", "^$")
 
 
 def test_labels_inside_a_recording_count_as_labelled(visit):

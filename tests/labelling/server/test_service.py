@@ -9,7 +9,6 @@ from aiohttp import ClientSession, web
 
 from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
-from holdfast.labelling.review.audit import Suspect
 from holdfast.labelling.server.documents import RecordingDetails
 from holdfast.labelling.server.service import LabellingService
 from holdfast.labelling.server.workspace import Workspace
@@ -351,20 +350,6 @@ def test_invalid_proposal_requests(tmp_path, body, text):
     assert status == 422
     assert reply["error"].startswith(text)
     assert opened["proposals"] == {}
-
-
-def test_suspects_of_an_audit_are_returned(tmp_path):
-    found = [
-        Suspect("grasp", "thumb", "interval", 1.0, 2.0, "stable", "unstable", 0.9),
-        Suspect("other", "thumb", "interval", 3.0, 4.0, "stable", "unstable", 0.9),
-    ]
-    _, reply = ask([made(tmp_path)], OPEN, suspects=found)[0]
-    assert reply["suspects"] == [
-        {
-            "finger": "thumb", "start": 1.0, "end": 2.0, "given": "stable",
-            "expected": "unstable", "confidence": 0.9, "kind": "interval",
-        }
-    ]  # fmt: skip
 
 
 def test_doubtful_labels_of_a_file_are_returned(tmp_path):

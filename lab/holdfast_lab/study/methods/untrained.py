@@ -68,5 +68,5 @@ NOISE_FLOOR = Method(
     "ours: builtin:noise-floor, stable while sigma at N_w = 14 is under three times the noise of "
     "the tare",
     noise_feature,
-    FixedRule(Model.load("builtin:noise-floor").finger(ANY_FINGER).stable.linear),
+    FixedRule(Model.load("builtin:noise-floor").finger(ANY_FINGER).stable.rule),
 )

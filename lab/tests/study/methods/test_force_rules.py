@@ -31,7 +31,7 @@ def test_the_fit_finds_the_coefficient_of_friction():
     stable = 0.6 * normal - tangential > 30
     given = Samples(np.column_stack([normal, tangential]), stable, np.arange(4000) % 5)
     fitted = FRICTION.recipe.fit(given, {**FRICTION.reference, "C": 1e4}, 0)
-    _, w_n, w_t = fitted.linear.raw_weights()[0]
+    _, w_n, w_t = fitted.rule.raw_weights()[0]
     assert w_t < 0
     assert -w_n / w_t == pytest.approx(0.6, abs=0.01)
     margins = 0.6 * normal - tangential - 30

@@ -1,4 +1,4 @@
-"""`holdfast export MODEL OUT`: a model as a C99 header, or its classifiers as ONNX."""
+"""`holdfast export MODEL OUT`: a model as a C99 header."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,11 +45,11 @@ class HeaderOptions:
 def export_model(
     model: str, out: Path, options: HeaderOptions, *, force: bool, as_json: bool
 ) -> None:
-    """Write a model as a C99 header, or its classifiers as ONNX.
+    """Write a model as a C99 header.
 
     Args:
         model: a model file or builtin:NAME.
-        out: `model.h` or `model.onnx`.
+        out: `model.h`.
         options: the hand, and the numbers of the header.
         force: replace an existing file.
         as_json: print JSON.
@@ -79,19 +79,18 @@ def export_model(
         in_contact=options.in_contact, force=force,
     )  # fmt: skip
     header = written.header
-    code = None if header is None else code_size(header)
+    code = code_size(header)
     if as_json:
-        document = {"out": written.path, "fingers": written.fingers, "size": written.size}
-        if header is not None:
-            document |= {
-                "state_size": header.state_size,
-                "constants_size": header.constants_size,
-                "code_size": code,
-                "double_fields": header.double_fields,
-            }
+        document = {
+            "out": written.path,
+            "fingers": written.fingers,
+            "size": written.size,
+            "state_size": header.state_size,
+            "constants_size": header.constants_size,
+            "code_size": code,
+            "double_fields": header.double_fields,
+        }
         print_json(document)
-    elif header is None:
-        print_line(f"{written.path}: {written.size} bytes; outputs {', '.join(written.fingers)}")
     else:
         print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
         print_line(f"  state      {header.state_size:9} bytes, one for each hand")

@@ -10,30 +10,24 @@ from holdfast.cli.export.recordings import RecordingOptions, export_recordings
 from holdfast.cli.extensions import ExporterOptions
 from holdfast.cli.options import ForceOption, JsonOption
 
-MODEL_OUTPUTS = (".h", ".onnx")
-"""Suffixes of what a model becomes."""
-
 
 def export(
     source: Annotated[
         str, typer.Argument(help="A model file or builtin:NAME; or a recording, or a folder.")
     ],
-    out: Annotated[
-        Path, typer.Argument(help="model.h or model.onnx; or a folder (a file for a CSV table).")
-    ],
+    out: Annotated[Path, typer.Argument(help="model.h; or a folder (a file for a CSV table).")],
     header: HeaderOptions,
     recordings: RecordingOptions,
     formats: ExporterOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Export a model as C or ONNX, or recordings to other tools.
+    """Export a model as C, or recordings to other tools.
 
     A C99 header is the whole detector: tare, features, faults and decisions, with all memory in
     one struct. It allocates nothing, and gives what holdfast detect gives at every sample. A
     program calls holdfast_init once, and holdfast_update for every sample. A model for any finger
-    needs the fingers of the hand, from a recording or from --sensor and --fingers. An ONNX file
-    has the linear classifiers alone: features in, probabilities out.
+    needs the fingers of the hand, from a recording or from --sensor and --fingers.
 
     Recordings need --format: lerobot is a LeRobot data set (v3.0), which holdfast import brings
     back without loss; foxglove is MCAP files with plots, states, a log and an arrow for each
@@ -43,14 +37,13 @@ def export(
     Example:
       holdfast export builtin:twin model.h --like grasp.parquet
       holdfast export builtin:any model.h --sensor uskin-curved --fingers 4
-      holdfast export builtin:twin model.onnx
       holdfast export grasps/ dataset/ --format lerobot
       holdfast export grasp.parquet view/ --format foxglove --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
     # The suffix of `out` decides as well: a wrong model is then refused as a model.
     is_named_so = source.startswith("builtin:") or source.endswith(".json")
-    if is_named_so or out.suffix in MODEL_OUTPUTS:
+    if is_named_so or out.suffix == ".h":
         if recordings != RecordingOptions() or formats.chosen():
             raise ValueError(f"--format, --fps and --model are for recordings; {source} is a model")
         export_model(source, out, header, force=force, as_json=as_json)

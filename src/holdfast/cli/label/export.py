@@ -13,38 +13,31 @@ from holdfast.errors import missing_part, require_extras
 
 
 def export(
-    kind: Annotated[str, typer.Argument(metavar="format", help="label-studio or csv.")],
+    kind: Annotated[str, typer.Argument(metavar="format", help="csv.")],
     folder: Annotated[Path, typer.Argument(help="Folder for the files.")],
     paths: PathsArgument,
     *,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Export labels to Label Studio, or as CSV.
+    """Export labels as CSV.
 
-    Write a task of Label Studio for each recording, or a CSV file. See docs/labels.md.
+    Write a CSV file for each recording. See docs/labels.md.
 
     Example:
-      holdfast label export label-studio studio/ recordings/
       holdfast label export csv labels/ recordings/ --json
     """
     require_extras("label")
     from holdfast.io import Dataset
-    from holdfast.labelling.exchange.read_labels import LABEL_PLUGINS
     from holdfast.labelling.labelled_files import recordings_at, save_csv
 
-    formats = (*LABEL_PLUGINS.names(), "csv")
-    if kind not in formats:
+    if kind != "csv":
         raise missing_part("labels", kind, f"the format {kind}") or ValueError(
-            f"--export {' or '.join(formats)} expected, {kind!r} given"
+            f"the format csv expected, {kind!r} given"
         )
     recordings = Dataset(recordings_at(paths))
-    if kind == "csv":
-        folder.mkdir(parents=True, exist_ok=True)
-        written = [save_csv(x, folder, force=force) for x in progress(recordings, "exporting")]
-    else:
-        save = LABEL_PLUGINS.require(kind, f"the format {kind}").save
-        written = save(progress(recordings, "exporting"), folder, force=force)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = [save_csv(x, folder, force=force) for x in progress(recordings, "exporting")]
     if as_json:
         print_json({"format": kind, "written": [str(path) for path in written]})
     else:

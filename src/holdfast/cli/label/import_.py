@@ -1,4 +1,4 @@
-"""`holdfast label import`: labels of other programs."""
+"""`holdfast label import`: labels of other programs and people."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from holdfast.cli.label.inputs import (
-    AnnotatorOption,
     AuthorOption,
     PathsArgument,
     SaveOptions,
@@ -22,39 +21,35 @@ if TYPE_CHECKING:
 
 
 def import_(
-    source: Annotated[
-        Path, typer.Argument(help="JSON of Label Studio, a CSV file, or a folder of labels.")
-    ],
+    source: Annotated[Path, typer.Argument(help="A CSV file, a label file, or a folder of these.")],
     paths: PathsArgument,
     *,
     author: AuthorOption = None,
     saving: SaveOptions,
-    annotator: AnnotatorOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Import labels from Label Studio, or CSV.
+    """Import labels from CSV or other label files.
 
     The labels are written to NAME.labels.json beside each recording. Labels of a person are
     overwritten only with --force. See docs/labels.md.
 
     Example:
-      holdfast label import export.json recordings/
-      holdfast label import export.json recordings/ --annotator ann --json
+      holdfast label import labels/ recordings/
+      holdfast label import grasp.labels.csv grasp.mcap --author ann --json
     """
     require_extras("label")
     from holdfast.errors import RecordingError
-    from holdfast.labelling.exchange.read_labels import read_labels
-    from holdfast.labelling.labelled_files import recordings_at
+    from holdfast.labelling.labelled_files import read_labels, recordings_at
 
     files = recordings_at(paths)
     if not source.exists():
-        raise RecordingError(f"{source} does not exist; labels of Label Studio or CSV expected")
+        raise RecordingError(f"{source} does not exist; a file or folder of labels expected")
     # A CSV of labels names fingers, and no recording.
     if source.is_file() and source.suffix == ".csv" and len(files) > 1:
         raise ValueError(f"{source} has the labels of one recording; {len(files)} recordings given")
 
     def labels_of(recording: "Recording", _: Path) -> "ModuleLabels":
-        return read_labels(source, recording, annotator)
+        return read_labels(source, recording)
 
-    documents = label_all(files, labels_of, author or annotator or login_name(), saving)
+    documents = label_all(files, labels_of, author or login_name(), saving)
     print_labelled({"source": str(source)}, documents, saving, as_json=as_json)

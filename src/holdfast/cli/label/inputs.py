@@ -1,4 +1,4 @@
-"""Inputs of the modes of `holdfast label`: recordings, and options that modes share."""
+"""Inputs of `holdfast label` and its commands: recordings, and options that they share."""
 
 import getpass
 from contextlib import suppress
@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.options import (
-    LOCALHOST,
     RARE,
     FittingTareOption,
     ForceOption,
     FpsOption,
-    ServerOptions,
 )
 from holdfast.errors import require_extras
 
@@ -25,19 +23,23 @@ if TYPE_CHECKING:
     from holdfast.recordings import Label, Recording
 
 
-LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
-"""Default address of the labelling page."""
 PathsArgument = Annotated[list[Path], typer.Argument(help="Recordings, or folders of them.")]
 AuthorOption = Annotated[
     str | None,
     typer.Option("--author", help="Author of the labels.", show_default="login name, or rule:RULE"),
 ]
-AnnotatorOption = Annotated[
-    str | None,
-    typer.Option("--annotator", help="Annotator whose labels are read from Label Studio."),
+PosesOption = Annotated[
+    Path | None,
+    typer.Option("--poses", help="Poses for the rule tracking: a CSV file or a ROS bag."),
 ]
-PageOption = Annotated[
-    bool, typer.Option("--page", help="Show the contradicted labels on the page.")
+TracksOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--track",
+        metavar="BODY=NAME",
+        help="Topic or frame of a body in the bag, or number of its sticker; BODY is object or "
+        "a finger.",
+    ),
 ]
 
 
@@ -46,18 +48,8 @@ class RuleOptions:
     """Group of options: how a rule labels."""
 
     tare: FittingTareOption = None
-    poses: Annotated[
-        Path | None, typer.Option(help="Poses for the rule tracking: a CSV file or a ROS bag.")
-    ] = None
-    tracks: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--track",
-            metavar="BODY=NAME",
-            help="Topic or frame of a body in the bag, or number of its sticker; BODY is object or "
-            "a finger.",
-        ),
-    ] = None
+    poses: PosesOption = None
+    tracks: TracksOption = None
     parameters: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the rule; may be repeated."),
@@ -176,41 +168,6 @@ class RuleOptions:
         elif self.fps is not None:
             raise ValueError("--fps is for a video: give --video FILE")
         return propose(rule, recording, **arguments)
-
-
-@dataclass(frozen=True)
-class ModeOptions:
-    """Group of options: the commands of `label` as they were written before; at most one."""
-
-    auto: Annotated[str | None, typer.Option(help="As holdfast label auto RULE.")] = None
-    compare: Annotated[bool, typer.Option("--compare", help="As holdfast label compare A B.")] = (
-        False
-    )
-    audit: Annotated[bool, typer.Option("--audit", help="As holdfast label audit.")] = False
-    export: Annotated[
-        tuple[str, Path] | None,
-        typer.Option(metavar="FORMAT FOLDER", help="As holdfast label export FORMAT FOLDER."),
-    ] = None
-    import_from: Annotated[
-        Path | None, typer.Option("--import", help="As holdfast label import FILE.")
-    ] = None
-    page: PageOption = False
-
-    def check(self) -> None:
-        """Check that at most one mode is given, and `--page` only with `--audit`.
-
-        Raises:
-            ValueError: two modes are given, or the page of no audit.
-        """
-        wanted = [
-            name.removesuffix("_from")
-            for name, value in vars(self).items()
-            if name != "page" and value not in (None, False)
-        ]
-        if len(wanted) > 1:
-            raise ValueError(f"--{wanted[0]} and --{wanted[1]} given; only one of them expected")
-        if self.page and not self.audit:
-            raise ValueError("--page shows the result of --audit: give --audit as well")
 
 
 @dataclass(frozen=True)

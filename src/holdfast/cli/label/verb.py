@@ -1,41 +1,48 @@
-"""`holdfast label`: label recordings on a page or by a rule, compare and audit labels."""
+"""`holdfast label`: the labelling page."""
 
+import sys
+from contextlib import suppress
+from threading import Thread
 from typing import Annotated
 
 from holdfast.cli.label.inputs import (
-    LABEL_ADDRESS,
-    AnnotatorOption,
     AuthorOption,
-    ModeOptions,
     PathsArgument,
+    PosesOption,
     RuleOptions,
-    SaveOptions,
+    TracksOption,
+    current_time,
+    login_name,
 )
 from holdfast.cli.options import (
-    DEFAULT_JOBS,
+    LOCALHOST,
     RARE,
     BrowserOption,
-    JobsOption,
+    FittingTareOption,
     JsonOption,
     ServerOptions,
 )
+from holdfast.cli.terminal.console import print_json, print_message
 from holdfast.errors import require_extras
+
+LABEL_ADDRESS = ServerOptions(LOCALHOST, port=8081)
+"""Default address of the labelling page."""
+END_TIMEOUT = 10.0
+"""Time for which the preparation may go on after Ctrl-C [s]."""
 
 
 def label(
     paths: PathsArgument,
     *,
-    mode: Annotated[ModeOptions, RARE],
-    options: RuleOptions,
+    tare: FittingTareOption = None,
+    poses: PosesOption = None,
+    tracks: TracksOption = None,
     author: AuthorOption = None,
-    saving: Annotated[SaveOptions, RARE],
-    annotator: Annotated[AnnotatorOption, RARE] = None,
-    jobs: Annotated[JobsOption, RARE] = DEFAULT_JOBS,
     access: Annotated[ServerOptions, RARE] = LABEL_ADDRESS,
     browser: BrowserOption = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Label recordings on a page or by a rule, and check labels.
+    """Label recordings on a page or by a rule.
 
     Without a command, open the labelling page: draw labels with the mouse, set states with keys,
     undo changes, and accept the proposals of a rule. Every change is saved at once. Labels are
@@ -45,43 +52,42 @@ def label(
     Example:
       holdfast label recordings/
       holdfast label auto signal recordings/ --dry-run
-      holdfast label compare recordings/ labels-of-ann/
-      holdfast label audit recordings/ --page
+      holdfast label export csv labels/ recordings/
     """
-    require_extras("label", *(("train",) if mode.audit else ()))
-    access.find_token()  # a wrong token is refused in every mode
-    mode.check()
-    if mode.auto is not None:
-        from holdfast.cli.label.auto import auto
+    require_extras("label")
+    from holdfast.errors import HoldfastError
+    from holdfast.labelling.labelled_files import recordings_at
+    from holdfast.labelling.server.service import LabellingService
+    from holdfast.labelling.server.workspace import Workspace
+    from holdfast.web.guard import Guard
+    from holdfast.web.server import open_browser, page_url, run_server
 
-        auto(mode.auto, paths, options=options, author=author, saving=saving, as_json=as_json)
-    elif mode.compare:
-        from holdfast.cli.label.compare import compare
+    token = access.find_token()
+    guard = Guard(access.host, token)
+    files = recordings_at(paths)
+    workspace = Workspace(
+        files,
+        author=login_name() if author is None else author,
+        clock=current_time,
+        tare=tare,
+        poses=RuleOptions(tare, poses, tracks).tracking,
+    )
 
-        if len(paths) != 2:
-            raise ValueError(f"--compare A B: two paths expected, {len(paths)} given")
-        compare(*paths, options=options, annotator=annotator, as_json=as_json)
-    elif mode.export is not None:
-        from holdfast.cli.label.export import export
+    def announce(url: str) -> None:
+        page = page_url(url, token)
+        if as_json:
+            print_json({"url": page, "recordings": len(files)})
+            sys.stdout.flush()  # a program that reads the pipe waits for the address
+        shown = browser is not False and open_browser(page)
+        where = "is open in the browser" if shown else "is the page"
+        what = f"{len(files)} recordings" if len(files) > 1 else files[0]
+        print_message(f"{page} {where} for {what}; Ctrl-C stops it")
 
-        export(*mode.export, paths, force=saving.force, as_json=as_json)
-    elif mode.import_from is not None:
-        from holdfast.cli.label.import_ import import_
+    def prepare() -> None:  # read the first recording while the browser starts
+        with suppress(HoldfastError, ValueError, OSError):  # the page reports it
+            workspace.changes(0)
 
-        import_(
-            mode.import_from, paths,
-            author=author, saving=saving, annotator=annotator, as_json=as_json,
-        )  # fmt: skip
-    elif mode.audit:
-        from holdfast.cli.label.audit import audit
-
-        audit(
-            paths, options=options, page=mode.page, author=author, jobs=jobs,
-            access=access, browser=browser, as_json=as_json,
-        )  # fmt: skip
-    else:
-        from holdfast.cli.label.page import show_label_page
-
-        show_label_page(
-            paths, options, access, author, browser=browser is not False, as_json=as_json
-        )
+    preparing = Thread(target=prepare, daemon=True)
+    preparing.start()
+    run_server(LabellingService(workspace, guard).app, access.host, access.port, announce)
+    preparing.join(END_TIMEOUT)  # a library that is at work when Python ends stops with an error

@@ -2,7 +2,7 @@
 
 import { colours, font, stateColour, stateLineColour } from "../web/theme.js";
 import { drawFrame, drawHatch, drawLine, drawStateShape, shortenText } from "./canvas.js";
-import { labelText, percent, stateKey, stateText } from "./format.js";
+import { labelText, percent, stateKey } from "./format.js";
 import { LEFT_MARGIN, RIGHT_MARGIN } from "./view.js";
 
 const STATE_OPACITY = { stable: 0.15, unstable: 0.25, "no-contact": 0.09 };
@@ -121,16 +121,14 @@ export function drawReviewItems(context, view, row, reviewItems, focus) {
       continue;
     }
     const top = row.force[0] - 2, thickness = focus && focus.item === each.item ? 3 : 2;
-    const dash = each.kind === "suspect" ? [7, 4] : [2, 3];
-    drawFrame(context, left, top, right - left, row.labels[1] + 1 - top, colours["unknown-line"], thickness, dash);
-    drawReviewText(context, each, left, top, right - left);
+    drawFrame(context, left, top, right - left, row.labels[1] + 1 - top, colours["unknown-line"], thickness, [2, 3]);
+    drawReviewText(context, each.item, left, top, right - left);
   }
 }
 
-function drawReviewText(context, { kind, item }, left, top, width) {
-  const text = kind === "suspect" ? `${stateText(item.expected)}? ${percent(item.confidence)}` : `unsure ${percent(item.confidence)}`;
+function drawReviewText(context, item, left, top, width) {
   context.font = font(11, 700);
-  const short = shortenText(context, text, Math.max(width - 8, 0)), textWidth = context.measureText(short).width;
+  const short = shortenText(context, `unsure ${percent(item.confidence)}`, Math.max(width - 8, 0)), textWidth = context.measureText(short).width;
   if (!short) return;
   context.fillStyle = colours["unknown-line"];
   context.fillRect(left, top, textWidth + 8, 15);

@@ -41,7 +41,7 @@ export class History {
 }
 
 export const EMPTY_RECORDING = {
-  fingers: [], labels: {}, proposals: {}, suspects: [], start: 0, end: 1, rate: 1, note: "", read_only: true,
+  fingers: [], labels: {}, proposals: {}, start: 0, end: 1, rate: 1, note: "", read_only: true,
 };
 
 const sameItem = (a, b) => a && b && a.finger === b.finger && a.item.start === b.item.start && a.item.end === b.item.end;
@@ -75,11 +75,11 @@ export class Editor {
 
   // Every redraw needs these lists, so they are computed once for each state.
   get openItems() {
-    const { state, recording: { proposals, suspects } } = this;
+    const { state, recording: { proposals } } = this;
     if (this.cache?.state !== state || this.cache.source !== proposals) {
       this.cache = {
         state, source: proposals,
-        proposals: openProposals(state, proposals), reviewItems: findReviewItems(state, proposals, suspects ?? []),
+        proposals: openProposals(state, proposals), reviewItems: findReviewItems(state, proposals),
       };
     }
     return this.cache;
@@ -188,18 +188,11 @@ export class Editor {
     return true;
   }
 
-  /** Accept a proposal, correct a label as the audit expects, or confirm a label. */
+  /** Accept a proposal, or confirm a label. */
   accept({ kind, finger, item }) {
     const labels = this.state.labels[finger], evidence = [item.author, "accepted", item.evidence].filter(Boolean).join(", ");
     const confirmed = this.byHand({ evidence });
-    if (kind === "suspect") {
-      const { start, end, expected: state } = item;
-      // A suspect at an edge extends the neighbour of the expected state, and takes its cause.
-      const neighbour = labels.find((each) => each.state === state && each.start <= end && each.end >= start);
-      const label = this.byHand({ start, end, state, cause: neighbour?.cause ?? null, evidence: "audit, accepted" });
-      this.selected = null;
-      this.setLabels({ [finger]: overwrite(labels, label, this.bounds.minDuration)[0] });
-    } else if (kind === "label") {
+    if (kind === "label") {
       const [changed, label] = change(labels, item, confirmed);
       this.selected = { finger, label, fresh: true };
       this.setLabels({ [finger]: changed });
@@ -222,7 +215,7 @@ export class Editor {
     return accepted.length;
   }
 
-  /** Reject a proposal or a suspect. */
+  /** Reject a proposal. */
   reject({ finger, item }) {
     this.apply({ rejected: new Set([...this.state.rejected, itemKey(finger, item)]) });
   }
@@ -247,7 +240,7 @@ export class Editor {
 
   /** Return the review item after the last reviewed one, or the first; null if there is none. */
   nextReviewItem() {
-    const items = this.reviewItems, key = (each) => [each.trust, each.item.start, each.finger];
+    const items = this.reviewItems, key = (each) => [each.item.confidence, each.item.start, each.finger];
     const next = this.lastReviewed && items.find((each) => !sameItem(each, this.lastReviewed) && compare(key(each), key(this.lastReviewed)) > 0);
     return (this.lastReviewed = next ?? items[0] ?? null);
   }

@@ -115,9 +115,8 @@ export function snap(time, candidates, maxDistance) {
   return nearest;
 }
 
-/** Return a key of a proposal or suspect that is the same after the page is loaded again. */
-export const itemKey = (finger, item) =>
-  `${finger}|${item.start}|${item.end}|${item.state ?? `${item.given}>${item.expected}`}`;
+/** Return a key of a proposal that is the same after the page is loaded again. */
+export const itemKey = (finger, item) => `${finger}|${item.start}|${item.end}|${item.state}`;
 
 /** Return the proposals that are neither labelled nor rejected, as { finger, item }, sorted by time. */
 export function openProposals({ labels, rejected }, proposals) {
@@ -127,25 +126,13 @@ export function openProposals({ labels, rejected }, proposals) {
     .sort((a, b) => a.item.start - b.item.start);
 }
 
-/** Return the suspects that are not rejected and whose label still has the suspected state. */
-export const openSuspects = ({ labels, rejected }, suspects) => suspects.filter((item) =>
-  !rejected.has(itemKey(item.finger, item)) && labelAt(labels[item.finger] ?? [], middle(item))?.state === item.given);
-
-/**
- * Return the items that a person should review, those of the lowest trust first.
- *
- * `kind` is "suspect", "label" or "proposal"; `trust` is the confidence in what is labelled or
- * proposed, from 0 to 1.
- */
-export function findReviewItems(state, proposals, suspects) {
+/** Return the items that a person should review, lowest confidence first; `kind` is "label" or "proposal". */
+export function findReviewItems(state, proposals) {
   const labels = Object.entries(state.labels).flatMap(([finger, own]) => own
     .filter((item) => item.confidence < LOW_CONFIDENCE)
-    .map((item) => ({ kind: "label", finger, item, trust: item.confidence })));
+    .map((item) => ({ kind: "label", finger, item })));
   const open = openProposals(state, proposals)
     .filter(({ item }) => item.confidence < LOW_CONFIDENCE)
-    .map((each) => ({ kind: "proposal", ...each, trust: each.item.confidence }));
-  // The confidence of a suspect is that of the audit, which contradicts the label.
-  const audit = openSuspects(state, suspects)
-    .map((item) => ({ kind: "suspect", finger: item.finger, item, trust: 1 - item.confidence }));
-  return [...audit, ...labels, ...open].sort((a, b) => a.trust - b.trust || a.item.start - b.item.start);
+    .map((each) => ({ kind: "proposal", ...each }));
+  return [...labels, ...open].sort((a, b) => a.item.confidence - b.item.confidence || a.item.start - b.item.start);
 }

@@ -1,7 +1,7 @@
 // Panels beside the plots: the list of recordings, and the items to review.
 
 import { byId, make, setText, shape } from "../web/dom.js";
-import { countOf, durationText, labelText, percent, stateKey, stateText, timeText } from "./format.js";
+import { countOf, durationText, labelText, percent, stateKey, timeText } from "./format.js";
 
 const MAX_REVIEW_ROWS = 60;
 
@@ -86,8 +86,7 @@ export class RecordingList {
 }
 
 const REVIEW_TITLES = {
-  suspect: "The audit contradicts this label", label: "This label has a low confidence",
-  proposal: "This proposal has a low confidence",
+  label: "This label has a low confidence", proposal: "This proposal has a low confidence",
 };
 
 /** List of the items to review, those of the lowest confidence first, and the number of open proposals. */
@@ -115,12 +114,10 @@ export class ReviewList {
 
   row(each) {
     const { kind, finger, item } = each;
-    const state = kind === "suspect" ? item.expected : item.state;
-    const text = kind === "suspect" ? `${stateText(item.given)} → ${stateText(item.expected)}?` : labelText(item);
-    const button = make("button", "review-item", shape(stateKey(state)), make("span", "finger", finger), make("span", "text", text),
+    const button = make("button", "review-item", shape(stateKey(item.state)), make("span", "finger", finger), make("span", "text", labelText(item)),
       make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
     button.type = "button";
-    button.dataset.state = stateKey(state);
+    button.dataset.state = stateKey(item.state);
     button.title = REVIEW_TITLES[kind];
     button.addEventListener("click", () => this.choose(each));
     return make("li", "", button);

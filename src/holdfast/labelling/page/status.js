@@ -1,7 +1,7 @@
 // Messages to the person who labels: alert, toasts, and the status bar.
 
 import { byId, make, setText, shape } from "../web/dom.js";
-import { dateText, labelText, percent, spanText, stateKey, stateText, timeText } from "./format.js";
+import { dateText, labelText, percent, spanText, stateKey, timeText } from "./format.js";
 import { LOW_CONFIDENCE } from "./labels.js";
 
 const TOAST_DURATION = 6000; // [ms]
@@ -49,8 +49,7 @@ export class SaveStatus {
 }
 
 const HINTS = {
-  proposal: "Enter accepts, X rejects", suspect: "Enter corrects the label, X keeps it",
-  label: "Enter confirms the label", fresh: "A copies the label to all fingers",
+  proposal: "Enter accepts, X rejects", label: "Enter confirms the label", fresh: "A copies the label to all fingers",
 };
 
 // Return the hint for an item of the status bar.
@@ -69,13 +68,11 @@ export function showItem(editor, target) {
     box.replaceChildren(make("span", "hint", editor.readOnly ? "" : "Drag over a finger to label it · ? shows all keys"));
     return;
   }
-  const { kind, finger, item } = shown, audit = kind === "suspect";
-  const text = audit ? `${stateText(item.given)}; the audit expects ${stateText(item.expected)}` : labelText(item);
-  const confidence = audit || item.confidence < 1 ? percent(item.confidence) : "";
-  const key = stateKey(audit ? item.expected : item.state);
+  const { kind, finger, item } = shown, key = stateKey(item.state);
+  const confidence = item.confidence < 1 ? percent(item.confidence) : "";
   const facts = [finger, spanText(item), confidence, item.author, item.evidence].filter(Boolean).join(" · ");
   const hint = editor.readOnly ? "" : hintFor(kind, item, selected?.fresh);
-  box.replaceChildren(shape(key), make("b", "", `${kind === "proposal" ? "proposed: " : ""}${text}`), make("span", "facts", facts), make("span", "hint", hint));
+  box.replaceChildren(shape(key), make("b", "", `${kind === "proposal" ? "proposed: " : ""}${labelText(item)}`), make("span", "facts", facts), make("span", "hint", hint));
   box.dataset.state = key;
   box.title = facts;
 }

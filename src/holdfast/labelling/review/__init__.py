@@ -1,5 +1,5 @@
-"""Review of labels: audit by a classifier, comparison of two sets of labels, low confidence."""
+"""Review of recordings and labels: findings, content, labels of low confidence."""
 
-from holdfast.labelling.review.spans import doubtful
+from holdfast.labelling.review.confidence import doubtful
 
 __all__ = ["doubtful"]

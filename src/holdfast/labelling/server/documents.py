@@ -1,13 +1,13 @@
 """JSON documents that the labelling page and its server exchange, and how they are made."""
 
-from typing import Any, Literal
+from typing import Any
 
 import msgspec
 
 from holdfast.errors import HoldfastError
 from holdfast.io.header import LabelData, label_data
 from holdfast.io.label_files import labels_for
-from holdfast.labelling.review.spans import State, doubtful, state_name
+from holdfast.labelling.review.confidence import State, doubtful, state_name
 from holdfast.labelling.server.store import LabelInput, ModuleLabels, Origin, is_read_only
 from holdfast.labelling.server.workspace import Workspace, beside
 from holdfast.recordings import Label
@@ -59,18 +59,6 @@ class DoubtfulLabel(msgspec.Struct, frozen=True):
     confidence: float
 
 
-class SuspectLabel(msgspec.Struct, frozen=True):
-    """A label that an audit contradicts; fields as in `holdfast.labelling.review.audit.Suspect`."""
-
-    finger: str
-    start: float
-    end: float
-    given: State
-    expected: State
-    confidence: float
-    kind: Literal["interval", "edge"]
-
-
 class Video(msgspec.Struct, frozen=True):
     """A video of the recording.
 
@@ -100,7 +88,6 @@ class RecordingDetails(msgspec.Struct, frozen=True, kw_only=True):
         rate: samples per second [Hz].
         labels: by finger.
         proposals: by finger.
-        suspects: results of an audit.
         doubtful: labels of low confidence, lowest first.
         markers: times [s] and texts.
         media: videos.
@@ -121,7 +108,6 @@ class RecordingDetails(msgspec.Struct, frozen=True, kw_only=True):
     rate: float
     labels: dict[str, list[LabelData]]
     proposals: dict[str, list[LabelData]]
-    suspects: list[SuspectLabel]
     doubtful: list[DoubtfulLabel]
     markers: list[tuple[float, str]]
     media: list[Video]
@@ -218,10 +204,6 @@ def describe_recording(workspace: Workspace, index: int) -> RecordingDetails:
         rate=recording.rate,
         labels=labels_data(stored.labels),
         proposals=labels_data(proposals),
-        suspects=[
-            SuspectLabel(s.finger, s.start, s.end, s.given, s.expected, s.confidence, s.kind)
-            for s in workspace.suspects(recording.name)
-        ],
         doubtful=doubtful_labels(stored.labels, proposals),
         markers=list(recording.markers),
         media=[

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from holdfast.errors import RecordingError
 from holdfast.features import Tare
@@ -30,9 +30,6 @@ from holdfast.labelling.server.store import (
     save_stored,
 )
 from holdfast.recordings import Label, Recording
-
-if TYPE_CHECKING:
-    from holdfast.labelling.review.audit import Suspect
 
 MAX_RECORDINGS_IN_MEMORY = 3
 """Recordings that are kept in memory: the one on the page and its neighbours."""
@@ -117,7 +114,6 @@ class Workspace:
         clock: returns the current time as ISO 8601 text.
         tare: how baselines are found; by default as `fitting_tare` chooses for each recording.
         poses: path of a CSV file of poses, or poses, for the rule `tracking`.
-        suspects: results of an audit of these recordings.
     """
 
     def __init__(
@@ -128,14 +124,12 @@ class Workspace:
         clock: Callable[[], str],
         tare: TareArgument | Tare | None = None,
         poses: str | Path | Poses | None = None,
-        suspects: "Sequence[Suspect]" = (),
     ) -> None:
         self.paths = tuple(paths)
         self.author = author
         self._clock = clock
         self._tare = None if tare is None else Tare.parse(tare)
         self._poses = poses
-        self._suspects = tuple(suspects)
         # The latest proposals by index, which `propose` replaces; summaries and open recordings by
         # version of the file, so that a file that changes is read again.
         self._proposals: dict[int, Proposals] = {}
@@ -257,10 +251,6 @@ class Workspace:
     def proposals(self, index: int) -> Proposals:
         """Return the latest proposals for a recording; empty before any rule was applied."""
         return self._proposals.get(index, {})
-
-    def suspects(self, name: str) -> "list[Suspect]":
-        """Return what the audit found in the recording of that name."""
-        return [suspect for suspect in self._suspects if suspect.recording == name]
 
     def video(self, index: int, video_index: int) -> Path | None:
         """Return the path of a video of a recording; None if there is none.

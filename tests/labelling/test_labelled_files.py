@@ -6,8 +6,9 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import labels_to_csv, save_labels, save_recording
-from holdfast.labelling.exchange.read_labels import LABEL_PLUGINS, read_labels
+from holdfast.labelling.labelled_files import read_labels
 from holdfast.recordings import Label
+from holdfast.removed import REMOVED
 from labelling.tiny import tiny_recording
 
 
@@ -124,23 +125,21 @@ def test_labels_of_a_finger_that_is_not_there(tmp_path, bare):
 def test_a_folder_without_labels_of_it(tmp_path, bare):
     assert refusal(tmp_path, bare) == (
         "no labels of 'grasp-3' in PATH; grasp-3 with one of .labels.json, .parquet, .mcap, "
-        ".labels.csv, .csv, .json expected"
+        ".labels.csv, .csv expected"
     )
 
 
 def test_files_without_labels(tmp_path, bare):
     assert refusal(tmp_path / "labels.txt", bare) == (
-        "cannot read labels from PATH: .txt given; .labels.json, .json, .csv, .parquet or .mcap "
-        "expected"
+        "cannot read labels from PATH: .txt given; .labels.json, .csv, .parquet or .mcap expected"
     )
     assert refusal(tmp_path / "no.json", bare) == "cannot read PATH: No such file or directory"
     (tmp_path / "odd.json").write_text("[]")
     assert refusal(tmp_path / "odd.json", bare).startswith("PATH is not a label file: ")
 
 
-def test_json_of_a_package_that_is_not_installed(tmp_path, bare, monkeypatch):
-    monkeypatch.setattr(LABEL_PLUGINS, "names", lambda: ())
-    for name, end in (("tasks.json", "; not installed: label-studio (holdfast-interop)"),
+def test_json_of_label_studio(tmp_path, bare):
+    for name, end in (("tasks.json", REMOVED["labels"]["label-studio"]),
                       ("tasks.labels.json", "got `array`")):  # fmt: skip
         (tmp_path / name).write_text("[]")
         text = refusal(tmp_path / name, bare)

@@ -1,32 +1,13 @@
-"""Labels as spans of one state, and labels of low confidence."""
+"""Labels of low confidence, for a person to check."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal
 
-import msgspec
-
-from holdfast.contact import TIME_TOLERANCE, ContactState
+from holdfast.contact import ContactState
 from holdfast.recordings import Label
 
 State = Literal["no_contact", "unstable", "stable"]
 """State of a label as files and JSON write it."""
-
-
-class Span(msgspec.Struct, frozen=True):
-    """Interval of one state, [start, end) [s]."""
-
-    start: float
-    end: float
-    state: State
-
-    @property
-    def code(self) -> int:
-        """Code of the state."""
-        return ContactState(self.state.upper()).code
-
-    def overlap(self, other: "Span") -> float:
-        """Return the duration that both have in common [s]; below 0 if they are apart."""
-        return min(self.end, other.end) - max(self.start, other.start)
 
 
 def state_name(state: ContactState) -> State:
@@ -34,27 +15,6 @@ def state_name(state: ContactState) -> State:
     name: Any = state.value.lower()
     spelled: State = name
     return spelled
-
-
-def spans_of(labels: Iterable[Label]) -> list[Span]:
-    """Return labels as spans in order of time; adjacent labels of one state become one span.
-
-    Args:
-        labels: without overlap.
-
-    Example:
-        >>> one, two = Label(1.0, 2.0, ContactState.STABLE), Label(0.0, 1.0, ContactState.STABLE)
-        >>> spans_of([one, two])
-        [Span(start=0.0, end=2.0, state='stable')]
-    """
-    spans: list[Span] = []
-    for label in sorted(labels, key=lambda each: each.start):
-        state = state_name(label.state)
-        if spans and spans[-1].state == state and label.start - spans[-1].end <= TIME_TOLERANCE:
-            spans[-1] = Span(spans[-1].start, label.end, state)
-        else:
-            spans.append(Span(label.start, label.end, state))
-    return spans
 
 
 def doubtful(labels: Mapping[str, Sequence[Label]], below: float = 0.8) -> list[tuple[str, Label]]:

@@ -1,1 +1,0 @@
-"""Labels in other formats: Label Studio, CSV, recordings, label files."""
