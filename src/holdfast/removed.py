@@ -4,11 +4,20 @@ LAST_COMMIT = "f7d623e5"
 """Commit of version 0.3.0, which still has all of it."""
 
 REMOVED: dict[str, dict[str, str]] = {
-    "verbs": {},
-    "options": {},
+    "verbs": {
+        "datasets score": "use holdfast evaluate MODEL RECORDINGS",
+    },
+    "options": {
+        "datasets --yes": "leave it out, no set is larger than 26 MB",
+    },
     "sources": {},
-    "importers": {},
-    "exporters": {},
+    "importers": {
+        "anyskin-slip": "holdfast import FILE OUT --sensor anyskin (without labels)",
+        "arq-crisp": "holdfast import FILE OUT --array tactile_data_raw=SENSOR (without labels)",
+    },
+    "exporters": {
+        "foxglove": "files of holdfast import RECORDINGS OUT --suffix mcap open in Foxglove",
+    },
     "hands": {},
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:

@@ -1,1 +1,1 @@
-"""Formats of other programs for holdfast: LeRobot, Foxglove, Label Studio, public data sets."""
+"""Formats of other programs for holdfast: LeRobot, Rerun, Label Studio, public data sets."""
