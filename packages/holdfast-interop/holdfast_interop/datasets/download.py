@@ -1,4 +1,4 @@
-"""Download of public sets by pooch, and their import.
+"""Download of public sets by pooch.
 
 pooch gives a file its name only when it is whole and its checksum, if one is known, is right.
 """
@@ -9,14 +9,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from holdfast.errors import OutputError, RecordingError, SourceError
 from holdfast_interop.datasets.registry import PublicFile, PublicSet
-
-if TYPE_CHECKING:
-    from holdfast.recording_import import ImportResult
 
 FOLDER_VARIABLE = "HOLDFAST_DATASETS"
 """Environment variable with the folder of all downloads."""
@@ -53,16 +50,14 @@ def download_files(
     import pooch
     from requests import RequestException
 
-    if mirror is None:
-        remotes = {file.path: file.remote or file.path for file in files}
-        base = public.address
-    elif mirror.startswith(("http://", "https://")):  # a copy has the files as they are stored here
-        remotes = {file.path: file.path for file in files}
-        base = f"{mirror.rstrip('/')}/{public.name}/"
-    else:
-        raise ValueError(
-            f"--mirror: an address such as http://HOST:8000 expected, {mirror!r} given"
-        )
+    base, remotes = public.address, {file.path: file.remote or file.path for file in files}
+    if mirror is not None:
+        if not mirror.startswith(("http://", "https://")):
+            raise ValueError(
+                f"--mirror: an address such as http://HOST:8000 expected, {mirror!r} given"
+            )
+        # A copy has the files as they are stored here.
+        base, remotes = f"{mirror.rstrip('/')}/{public.name}/", {f.path: f.path for f in files}
     folder = download_folder(public.name)
     storage = pooch.create(
         folder,
@@ -94,36 +89,6 @@ def download_files(
         ) from cause
     finally:
         logger.setLevel(before)
-
-
-def import_files(
-    public: PublicSet,
-    files: Sequence[PublicFile],
-    out: Path,
-    *,
-    force: bool,
-    notify: Callable[[str], None],
-    steps: Callable[[Iterable[Any], str, float], Iterable[Any]],
-) -> "ImportResult":
-    """Import downloaded files of a set, all of them or none.
-
-    Args:
-        public: the set.
-        files: from `select_files`.
-        out: folder for the recordings.
-        force: replace existing recordings.
-        notify: called with each message of the import.
-        steps: shows the progress of the import.
-
-    Raises:
-        HoldfastError: the files cannot be imported.
-    """
-    from holdfast.parallel import Engine
-    from holdfast.recording_import import ImportTask, import_all
-
-    task = ImportTask(out, public.importer, force=force)
-    with linked_folder(files, download_folder(public.name)) as selected:
-        return import_all(selected, task, Engine(), notify=notify, steps=steps)
 
 
 @contextmanager

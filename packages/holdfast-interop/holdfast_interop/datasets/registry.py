@@ -1,4 +1,4 @@
-"""Registry of public recordings: the file `registry.json`, checked when it is read.
+"""Registry of public recordings: the file `registry.json`.
 
 No address in it was tried where it was written: there was no network. Paths and commits come from
 listings of the repositories. A sha256 is that of a copy, whose size equals that of the original
@@ -9,15 +9,9 @@ from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from functools import cache
 from importlib import resources
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-
-REGISTRY_SCHEMA = "holdfast.datasets/1"
-
-_Path = Annotated[str, msgspec.Meta(pattern=r"^(?!.*\.\.)[A-Za-z0-9_][A-Za-z0-9_./-]*$")]
-_Digest = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}$")]
-_Address = Annotated[str, msgspec.Meta(pattern=r"^https?://[^\s]+$")]
 
 
 class PublicFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -29,9 +23,9 @@ class PublicFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         sha256: of the content; None if it is not known, and the file is not checked.
     """
 
-    path: _Path
-    remote: _Path | None = None
-    sha256: _Digest | None = None
+    path: str
+    remote: str | None = None
+    sha256: str | None = None
 
 
 class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -46,43 +40,34 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         labels: what is labelled, and how.
         licence: SPDX name.
         page: address for people.
-        address: of the files, ends with a slash.
-        importer: format of the files.
         size: about, of all files [bytes].
+        importer: format of the files.
+        address: of the files, ends with a slash.
         files: files to download.
         starts_loaded: whether the object is held at the first sample.
     """
 
-    name: _Path
+    name: str
     title: str
     sensors: tuple[str, ...]
     n_modules: int
     rate: float
     labels: str
     licence: str
-    page: _Address
-    address: _Address
-    importer: str
+    page: str
     size: int
+    importer: str
+    address: str
     files: tuple[PublicFile, ...]
     starts_loaded: bool = False
 
     def document(self) -> dict[str, Any]:
         """Return the facts of a set, with the counts of its files."""
-        fields = [
-            "name",
-            "title",
-            "sensors",
-            "n_modules",
-            "rate",
-            "labels",
-            "licence",
-            "page",
-            "size",
-            "importer",
-        ]
+        facts = msgspec.structs.asdict(self)
+        for field in ("address", "files", "starts_loaded"):
+            del facts[field]
         return {
-            **{field: getattr(self, field) for field in fields},
+            **facts,
             "n_files": len(self.files),
             "n_checksums": sum(file.sha256 is not None for file in self.files),
             # All sets went from a server to a decision in the tests, and can be downloaded.
@@ -91,28 +76,11 @@ class PublicSet(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         }
 
 
-class Registry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Content of `registry.json`."""
-
-    schema: str
-    datasets: tuple[PublicSet, ...]
-
-    def __post_init__(self) -> None:
-        """Check the schema.
-
-        Raises:
-            ValueError: the schema is another one.
-        """
-        if self.schema != REGISTRY_SCHEMA:
-            raise ValueError(f"schema {REGISTRY_SCHEMA} expected, {self.schema!r} given")
-
-
 @cache
 def public_sets() -> dict[str, PublicSet]:
     """Return all public sets by name."""
     data = resources.files("holdfast_interop.datasets").joinpath("registry.json").read_bytes()
-    registry = msgspec.json.decode(data, type=Registry)
-    return {public.name: public for public in registry.datasets}
+    return {public.name: public for public in msgspec.json.decode(data, type=list[PublicSet])}
 
 
 def find_set(name: str) -> PublicSet:

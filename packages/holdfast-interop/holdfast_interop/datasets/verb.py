@@ -66,16 +66,20 @@ def datasets(
       holdfast detect builtin:any \
         uskin-pick-move/data_sample_2022-02-22-08-10-01.parquet
     """
-    from holdfast_interop.datasets import download, registry
+    from holdfast_interop.datasets.download import download_files, download_folder, linked_folder
+    from holdfast_interop.datasets.registry import select_files
 
     if action is DatasetAction.LIST:
         print_set(name, as_json=as_json) if name else print_sets(as_json=as_json)
         return
-    public, files = registry.select_files(name, only or [], with_checksum)
-    download.download_files(public, files, mirror, progress)
-    result = download.import_files(
-        public, files, out or Path(public.name), force=force, notify=print_message, steps=progress
-    )
+    from holdfast.parallel import Engine
+    from holdfast.recording_import import ImportTask, import_all
+
+    public, files = select_files(name, only or [], with_checksum)
+    download_files(public, files, mirror, progress)
+    task = ImportTask(out or Path(public.name), public.importer, force=force)
+    with linked_folder(files, download_folder(public.name)) as selected:
+        result = import_all(selected, task, Engine(), notify=print_message, steps=progress)
     print_result(public, files, result, as_json=as_json)
 
 

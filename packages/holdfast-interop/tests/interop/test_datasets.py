@@ -63,7 +63,7 @@ def made_up(tmp_path, monkeypatch):
         files = (PublicFile("one.csv"), PublicFile("two.csv"))
         public = PublicSet(
             "made-up", "t", ("uskin-curved",), 1, 150.0, "none", "MIT", "https://made-up.example",
-            f"{server.url}/made-up/", "csv", 2_000_000, files,
+            2_000_000, "csv", f"{server.url}/made-up/", files,
         )  # fmt: skip
         monkeypatch.setitem(public_sets(), "made-up", public)
         server.public = public

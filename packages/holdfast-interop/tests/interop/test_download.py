@@ -42,7 +42,7 @@ def get(server, mirror=None):
     files = (known, PublicFile("b.bin"))
     public = PublicSet(
         "made-up", "t", (), 1, 100.0, "none", "MIT", "https://made-up.example",
-        f"{server.url}/", "csv", 256_010, files,
+        256_010, "csv", f"{server.url}/", files,
     )  # fmt: skip
     download_files(public, files, mirror, lambda files, what, total: files)
 
