@@ -55,10 +55,15 @@ def test_series_are_those_of_the_detector(grasp, traces):
     assert list(found) == ["force", "instability", "stable_probability"]
     for finger, trace in traces.items():
         assert found["instability"][finger] == (trace.times, trace.instability)
-        assert found["force"][finger][1] == pytest.approx(np.linalg.norm(trace.force, axis=1))
+        force = np.linalg.norm(trace.force, axis=1)
+        np.testing.assert_array_equal(found["force"][finger][1], force)
+
+
+def test_arrows_have_the_states_of_estimates_or_else_of_labels(grasp, traces):
     for name, module in grasp.modules.items():
-        assert state_codes(grasp, traces)[name] == (traces[name].times, traces[name].state)
-        assert state_codes(grasp, {})[name] == (module.times, module.label_states)
+        found = [state_codes(grasp, given)[name][1] for given in (traces, {})]
+        for codes, expected in zip(found, (traces[name].state, module.label_states), strict=True):
+            np.testing.assert_array_equal(codes, expected)
 
 
 def test_alarms_are_those_of_the_detector(grasp, traces):
