@@ -47,6 +47,18 @@ def test_an_empty_file(tmp_path, name):
         list(import_recordings(tmp_path / "a.csv", name))
 
 
+def test_a_pointer_of_git_lfs_is_named(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:a2aef56b\n")
+    for place, form in ((path, "arrays"), (path, None), (tmp_path, None)):
+        with pytest.raises(RecordingError) as caught:
+            list(import_recordings(place, form))
+        assert str(caught.value) == (
+            f"{path} is a pointer of Git LFS (63 bytes), not the data: in a clone, `git lfs pull` "
+            "fetches them"
+        )
+
+
 def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
     with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
