@@ -1,8 +1,6 @@
 """A server of files on loopback that can do what servers on the internet do wrong."""
 
-import re
-import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import partial
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
@@ -13,20 +11,16 @@ class FileServer:
     """A server of a folder.
 
     Attributes:
-        requests: path and range of each request.
+        requests: path of each request.
         cut_after: number of bytes after which the next answers end, one for each answer.
-        ranges: whether parts of files are sent.
         status: of all answers, in place of a file.
         replaced: content by path, in place of that of the folder.
-        headers: that replace those of all answers; one without a value is left out.
-        slow: `headers` or `body` arrive a byte in 0.05 s, for at most 3 s.
     """
 
     def __init__(self, folder):
         self.folder = folder
-        self.requests, self.cut_after, self.ranges = [], [], True
+        self.requests, self.cut_after = [], []
         self.status, self.replaced, self.url = None, {}, ""
-        self.headers, self.slow = {}, ""
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -36,41 +30,17 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self):
         state, path = self.state, unquote(self.path).lstrip("/")
-        wanted = re.fullmatch(r"bytes=(\d+)-", self.headers.get("Range", ""))
-        start = int(wanted[1]) if wanted and state.ranges else 0
-        state.requests.append((path, start))
+        state.requests.append(path)
         file = state.folder / path
         data = state.replaced.get(path) or (file.read_bytes() if file.is_file() else None)
         if data is None or state.status:
             self.send_error(state.status or 404)
             return
-        if start > len(data):
-            self.send_error(416)
-            return
-        if state.slow == "headers":
-            self._drip(b"HTTP/1.0 200 OK\r\nX: " + b"x" * 60)
-            return
-        headers = {"Content-Length": str(len(data) - start)}
-        if start:
-            headers["Content-Range"] = f"bytes {start}-{len(data) - 1}/{len(data)}"
-        headers |= state.headers
-        status = 302 if "Location" in headers else 206 if start else 200
-        self.send_response(status)
-        for name, value in headers.items():
-            if value is not None:
-                self.send_header(name, value)
+        self.send_response(200)
+        self.send_header("Content-Length", str(len(data)))
         self.end_headers()
-        if state.slow == "body":
-            self._drip(data)
-            return
         end = state.cut_after.pop(0) if state.cut_after else len(data)
-        self.wfile.write(data[start : start + end])
-
-    def _drip(self, data):
-        with suppress(OSError):
-            for byte in data[:60]:
-                self.wfile.write(bytes([byte]))
-                time.sleep(0.05)
+        self.wfile.write(data[:end])
 
     def log_message(self, *given):
         """Print nothing."""

@@ -83,10 +83,6 @@ MISSING = {
         ["import", "log.csv", "others", "--sensor", "anyskin", "--suffix", "parquet"],
     ],
     "plot": [["info", "grasp.mcap", "--plot", "a.png"], ["sensors", "anyskin", "--plot", "a.png"]],
-    "hdf5": [
-        ["import", "a.h5", "others", "--format", "arq-crisp"],
-        ["datasets", "get", "arq-slip-2021"],
-    ],
     "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
     "cluster": [
         ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]
@@ -106,7 +102,6 @@ def outcomes(tmp_path_factory):
     normalised_model().save(folder / "normalised.json")
     (folder / "other").mkdir()
     (folder / "other" / "grasp.parquet").write_bytes(b"PAR1")
-    (folder / "a.h5").write_bytes(b"\x89HDF\r\n\x1a\n")
     columns = ["t", *(f"{axis}{taxel}" for taxel in range(1, 6) for axis in "xyz")]
     numbers = np.column_stack(
         [np.arange(300) / 100, np.random.default_rng(0).normal(size=(300, 15))]

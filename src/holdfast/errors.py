@@ -49,7 +49,7 @@ EXTRA_PURPOSES = {
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
     "grip": "holdfast hold: control of the grip force of a hand",
-    "interop": "LeRobot, Foxglove, Rerun and public data sets",
+    "interop": "LeRobot, Rerun and public data sets",
 }
 """Purpose of each extra, also of those that install packages beside the core."""
 
@@ -86,8 +86,8 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "holdfast-interop": {
         "verbs": ("datasets",),
-        "importers": ("anyskin-slip", "arq-crisp", "eflesh", "gtac", "lerobot", "uskin-pick-move"),
-        "exporters": ("foxglove", "lerobot", "rerun"),
+        "importers": ("eflesh", "gtac", "lerobot", "uskin-pick-move"),
+        "exporters": ("lerobot", "rerun"),
         "publishers": ("rerun",),
         "options": ("export --fps", "export --model", "serve --rerun"),
     },

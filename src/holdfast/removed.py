@@ -11,6 +11,7 @@ REMOVED: dict[str, dict[str, str]] = {
     "verbs": {
         "label audit": AUDIT,
         "label compare": COMPARE,
+        "datasets score": "use holdfast evaluate MODEL RECORDINGS",
     },
     "options": {
         "label --auto": "holdfast label auto RULE RECORDINGS",
@@ -30,12 +31,19 @@ REMOVED: dict[str, dict[str, str]] = {
         "label --annotator": LABELS_AS_CSV,
         "label import --annotator": LABELS_AS_CSV,
         "train --objective": "none; the search of an SVM minimises errors, any other the log loss",
+        "datasets --yes": "leave it out, no set is larger than 26 MB",
     },
     "sources": {},
-    "importers": {},
-    "labels": {"label-studio": LABELS_AS_CSV},
+    "importers": {
+        "anyskin-slip": "holdfast import FILE OUT --sensor anyskin (without labels)",
+        "arq-crisp": "holdfast import FILE OUT --array tactile_data_raw=SENSOR (without labels)",
+    },
+    "labels": {
+        "label-studio": LABELS_AS_CSV,
+    },
     "exporters": {
         "onnx": "holdfast export MODEL model.h carries a model to other programs",
+        "foxglove": "files of holdfast import RECORDINGS OUT --suffix mcap open in Foxglove",
     },
     "hands": {},
     "rules": {

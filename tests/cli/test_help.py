@@ -25,8 +25,8 @@ SHOWN = {
     "--force --json",
     "hold": "--hand --law --armed --confirm --max-scale --max-force --on-fault --record --seconds "
     "--speed --in-contact --json",
-    "export": "--like --sensor --fingers --float --format --model --fps --force --json",
-    "datasets": "--only --yes --force --json",
+    "export": "--like --sensor --fingers --float --format --fps --model --force --json",
+    "datasets": "--only --force --json",
     "trial": "--out --laws --model --quick --n --plant --impacts --jobs --force --json",
     "study": "--out --twin --quick --full --jobs --tare --benchmark --force --json",
     "label auto": "--tare --poses --track --video --author --dry-run --force --json",

@@ -1,1 +1,1 @@
-"""Formats of other programs for holdfast: LeRobot, Foxglove, public data sets."""
+"""Formats of other programs for holdfast: LeRobot, Rerun, public data sets."""

@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.terminal.console import print_message
 from holdfast.errors import HoldfastError, is_installed, require_extras
 
 if TYPE_CHECKING:
     from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.model import Model
     from holdfast_interop.rerun.publisher import RerunPublisher
 
 
@@ -28,19 +26,13 @@ class LeRobotOptions:
 
 
 @dataclass(frozen=True)
-class ViewerOptions:
-    """Options of files for Foxglove and Rerun."""
+class RerunOptions:
+    """Options of files for Rerun."""
 
     model: Annotated[
         str | None,
         typer.Option(help="Model whose estimates are shown: a file or builtin:NAME."),
     ] = None
-
-    def load_model(self) -> "Model | None":
-        """Load the model; None without the option."""
-        from holdfast.model import Model
-
-        return None if self.model is None else Model.load(self.model)
 
 
 @dataclass(frozen=True)
@@ -75,48 +67,26 @@ class LeRobot:
         return {**totals, "fps": rate}
 
 
-class Foxglove:
-    """MCAP files with plots, states, a log and an arrow for each taxel, and a layout for them."""
-
-    OPTIONS = ViewerOptions()
-
-    @staticmethod
-    def export(
-        recordings: "Dataset",
-        out: Path,
-        options: ViewerOptions,
-        *,
-        force: bool,
-        progress: Any,  # noqa: ANN401
-    ) -> dict[str, Any]:
-        """Write the files, and return what they have."""
-        from holdfast_interop.foxglove import exporter as foxglove
-
-        model = options.load_model()
-        totals = foxglove.export(recordings, out, model=model, force=force, progress=progress)
-        print_message(f"hint: import the layout {out / foxglove.LAYOUT_FILE} in Foxglove")
-        return {**totals, "layout": out / foxglove.LAYOUT_FILE}
-
-
 class Rerun:
     """Files for Rerun, and its live view: states, forces, taxels with arrows, and events."""
 
-    OPTIONS = ViewerOptions()
+    OPTIONS = RerunOptions()
 
     @staticmethod
     def export(
         recordings: "Dataset",
         out: Path,
-        options: ViewerOptions,
+        options: RerunOptions,
         *,
         force: bool,
         progress: Any,  # noqa: ANN401
     ) -> dict[str, Any]:
         """Write the files, and return how many."""
         require_rerun()
+        from holdfast.model import Model
         from holdfast_interop.rerun import exporter
 
-        model = options.load_model()
+        model = None if options.model is None else Model.load(options.model)
         return exporter.export(recordings, out, model=model, force=force, progress=progress)
 
 

@@ -1,13 +1,15 @@
 """Arrays of containers: by path or by shape, with their times; else the command that works."""
 
 import json
+import sys
 
 import numpy as np
 import pytest
 
-from holdfast.errors import RecordingError
+from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers.array_tables import StoredArray, recordings_of_arrays
+from holdfast.io.importers.arrays import arrays_of_hdf5
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.sensors import sensor
 
@@ -257,14 +259,49 @@ def test_what_cannot_be_read_has_the_command_that_works(tmp_path, monkeypatch, w
     assert "\n" not in str(caught.value)
 
 
-def test_nothing_outside_of_the_file_is_read(tmp_path):
+def external_link(content, other):
+    import h5py
+
+    content["F"] = h5py.ExternalLink(str(other), "F")
+
+
+def external_storage(content, other):
+    import h5py
+
+    place = (str(other), 0, h5py.h5f.UNLIMITED)
+    content.create_dataset("F", READINGS.shape, "f8", external=[place])
+
+
+def virtual(content, other):
+    import h5py
+
+    layout = h5py.VirtualLayout(READINGS.shape, "f8")
+    layout[:] = h5py.VirtualSource(str(other), "F", READINGS.shape)
+    content.create_virtual_dataset("F", layout)
+
+
+def soft_link(content, other):
+    import h5py
+
+    content["G"] = READINGS
+    content["F"] = h5py.SoftLink("/G")
+
+
+@pytest.mark.parametrize("store", [external_link, external_storage, virtual, soft_link])
+def test_nothing_outside_of_the_file_is_read(tmp_path, store):
     h5py = pytest.importorskip("h5py", reason="h5py is not installed")
-    hdf5(tmp_path / "other", {"F": READINGS})
+    other = hdf5(tmp_path / "other", {"F": READINGS})
     file = hdf5(tmp_path / "a", {"time": TIMES})
     with h5py.File(file, "a") as content:
-        content["F"] = h5py.ExternalLink(str(tmp_path / "other.hdf5"), "F")
+        store(content, other)
     with pytest.raises(RecordingError, match="F is no array stored in this file; links"):
         imported(file, {"F": SKIN})
+
+
+def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(MissingExtra, match=r"h5py, which is not installed: .*hdf5"):
+        arrays_of_hdf5(tmp_path / "a.h5")
 
 
 def test_an_array_that_unpacks_to_more_than_the_memory(tmp_path):

@@ -43,8 +43,20 @@ def test_an_empty_folder(tmp_path, name):
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in FOLDERS])
 def test_an_empty_file(tmp_path, name):
     (tmp_path / "a.csv").write_text("")
-    with pytest.raises(RecordingError, match=r"a\.csv is (empty|not an HDF5 file)"):
+    with pytest.raises(RecordingError, match=r"a\.csv is empty"):
         list(import_recordings(tmp_path / "a.csv", name))
+
+
+def test_a_pointer_of_git_lfs_is_named(tmp_path):
+    path = tmp_path / "a.h5"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:a2aef56b\n")
+    for place, form in ((path, "arrays"), (path, None), (tmp_path, None)):
+        with pytest.raises(RecordingError) as caught:
+            list(import_recordings(place, form))
+        assert str(caught.value) == (
+            f"{path} is a pointer of Git LFS (63 bytes), not the data: in a clone, `git lfs pull` "
+            "fetches them"
+        )
 
 
 def test_a_pipe_is_refused_at_once(tmp_path):

@@ -1,19 +1,25 @@
 """`holdfast datasets`: public recordings, from their address to recordings of holdfast."""
 
-import sys
+from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from holdfast.cli.options import RARE, ForceOption, JsonOption
-from holdfast.cli.terminal.console import print_json, print_message, print_table
-from holdfast.cli.terminal.progress import ProgressBar, progress
-from holdfast.errors import require_extras
+from holdfast.cli.terminal.console import (
+    print_json,
+    print_line,
+    print_message,
+    print_paragraph,
+    print_table,
+)
+from holdfast.cli.terminal.progress import format_size, progress
 
-CONFIRMED_SIZE = 1_000_000_000
-"""Size from which a download is confirmed first [bytes]."""
+if TYPE_CHECKING:
+    from holdfast.recording_import import ImportResult
+    from holdfast_interop.datasets import PublicFile, PublicSet
 
 
 class DatasetAction(StrEnum):
@@ -21,11 +27,10 @@ class DatasetAction(StrEnum):
 
     LIST = "list"
     GET = "get"
-    SCORE = "score"
 
 
 def datasets(
-    action: Annotated[DatasetAction, typer.Argument(help="list, get NAME, or score NAME.")] = (
+    action: Annotated[DatasetAction, typer.Argument(help="list, or get NAME.")] = (
         DatasetAction.LIST
     ),
     name: Annotated[str | None, typer.Argument(help="Name of a data set.")] = None,
@@ -35,7 +40,7 @@ def datasets(
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="Only files that fit a pattern, such as '*brush*'. May be repeated."),
+        typer.Option(help="Only files that fit a pattern, such as '*Apple*'. May be repeated."),
     ] = None,
     with_checksum: Annotated[
         bool, typer.Option("--with-checksum", help="Only files whose sha256 is known."), RARE
@@ -45,9 +50,6 @@ def datasets(
         typer.Option(metavar="URL", help="Address of a copy: its files are at URL/NAME/FILE."),
         RARE,
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Download gigabytes without a question.")] = (
-        False
-    ),
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -55,9 +57,8 @@ def datasets(
 
     list NAME shows one set, with its page and licence: read both before you use it. Only get
     opens a connection. It downloads to the folder HOLDFAST_DATASETS (by default the cache of the
-    user), checks each sha256 that is known, and continues what was interrupted. Then it imports
-    the files into OUT. docs/datasets.md says what was tried. score trains on the recordings in OUT
-    that the published split trains on, and tests on the others, sample by sample.
+    user), checks each sha256 that is known, and leaves out files that it has already. Then it
+    imports the files into OUT. docs/datasets.md says what was tried.
 
     Example:
       holdfast datasets
@@ -65,55 +66,81 @@ def datasets(
       holdfast detect builtin:any \
         uskin-pick-move/data_sample_2022-02-22-08-10-01.parquet
     """
-    from holdfast_interop.datasets import find_set, tables
+    from holdfast_interop.datasets.download import download_files, download_folder, linked_folder
+    from holdfast_interop.datasets.registry import select_files
 
     if action is DatasetAction.LIST:
-        tables.print_set(name, as_json=as_json) if name else tables.print_sets(as_json=as_json)
-    elif action is DatasetAction.GET:
-        from holdfast_interop.datasets import download, registry
-
-        public, files = registry.select_files(name, only or [], with_checksum)
-        size = registry.size_of(public, files)
-        if not yes:
-            confirm(public.name, size)
-        with ProgressBar("downloading", size or None) as bar:
-            download.download_files(public, files, mirror, bar.advance)
-        result = download.import_files(
-            public, files, out or Path(public.name),
-            force=force, notify=print_message, steps=progress,
-        )  # fmt: skip
-        tables.print_result(public, files, result, as_json=as_json)
-    else:
-        from holdfast_interop.datasets.score import score_split
-
-        require_extras("train")
-        public = find_set(str(name))
-        if not public.test:
-            raise ValueError(f"{name} has no published split")
-        scores = score_split(out or Path(public.name), public.test)
-        if as_json:
-            print_json({"name": name, "test": public.test, **scores})
-            return
-        rows = [
-            (row, f"{100 * x['accuracy']:.1f}", f"{x['ap']:.3f}", f"{x['auc']:.3f}")
-            for row, x in scores.items()
-        ]
-        print_table(("slip by sample", "accuracy [%]", "AP", "AUC"), rows)
-
-
-def confirm(name: str, size: int) -> None:
-    """Return after a confirmation of a large download.
-
-    Raises:
-        ValueError: there is no terminal to confirm it.
-        typer.Exit: it is not wanted.
-    """
-    from holdfast_interop.datasets.download import format_size
-
-    if size < CONFIRMED_SIZE:
+        print_set(name, as_json=as_json) if name else print_sets(as_json=as_json)
         return
-    if not sys.stdin.isatty():
-        raise ValueError(f"{name} has {format_size(size)}: give --yes to download it")
-    if not typer.confirm(f"{name} has {format_size(size)}. Download it?", err=True):
-        print_message("nothing was downloaded")
-        raise typer.Exit
+    from holdfast.parallel import Engine
+    from holdfast.recording_import import ImportTask, import_all
+
+    public, files = select_files(name, only or [], with_checksum)
+    download_files(public, files, mirror, progress)
+    task = ImportTask(out or Path(public.name), public.importer, force=force)
+    with linked_folder(files, download_folder(public.name)) as selected:
+        result = import_all(selected, task, Engine(), notify=print_message, steps=progress)
+    print_result(public, files, result, as_json=as_json)
+
+
+def print_sets(*, as_json: bool) -> None:
+    """Print a line for each set."""
+    from holdfast_interop.datasets import public_sets
+
+    if as_json:
+        print_json({"datasets": [public.document() for public in public_sets().values()]})
+        return
+    rows = [
+        (
+            public.name,
+            ", ".join(public.sensors),
+            f"{public.rate:g}",
+            public.labels,
+            public.licence,
+            format_size(public.size),
+        )
+        for public in public_sets().values()
+    ]
+    print_table(("data set", "sensor", "rate [Hz]", "labels", "licence", "size"), rows)
+    print_line()
+    print_paragraph(
+        "The files with a known sha256 went from a server to a decision in the tests. No address "
+        "could be tried where this list was made. holdfast datasets list NAME shows one set."
+    )
+
+
+def print_set(name: str, *, as_json: bool) -> None:
+    """Print the facts of a set."""
+    from holdfast_interop.datasets import find_set
+
+    document = find_set(name).document()
+    if as_json:
+        print_json(document)
+        return
+    document["sensors"] = ", ".join(document["sensors"])
+    print_table(
+        ("data set", document.pop("name")),
+        [(key, value or "-") for key, value in document.items()],
+    )
+
+
+def print_result(
+    public: "PublicSet", files: "Sequence[PublicFile]", result: "ImportResult", *, as_json: bool
+) -> None:
+    """Print what was imported of a set, its licence, and what to do next."""
+    from holdfast.cli.import_ import print_imported
+    from holdfast_interop.datasets.download import download_folder
+
+    n_unchecked = sum(file.sha256 is None for file in files)
+    folder = download_folder(public.name)
+    facts = {"dataset": public.name, "licence": public.licence, "folder": folder}
+    counts = {"n_files": len(files), "n_unchecked": n_unchecked}
+    print_imported(result, {**facts, **counts}, as_json=as_json)
+    if n_unchecked:
+        print_message(
+            f"{n_unchecked} of {len(files)} files have no known sha256 and were not checked"
+        )
+    print_message(f"licence: {public.licence} ({public.page}); downloads are in {folder}")
+    first = result.imported[0].document["path"]
+    option = " --in-contact" if public.starts_loaded else ""
+    print_message(f"next: holdfast detect builtin:any {first}{option}")

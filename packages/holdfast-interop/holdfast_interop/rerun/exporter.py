@@ -87,7 +87,7 @@ def write_recording(recording: Recording, path: Path, model: "Model | None") -> 
     instants = scene_instants(recording)
     traces: Traces = {} if model is None else detect(model, recording).fingers
     tracks = series(recording, traces)
-    frames, _ = frames_of(recording)
+    frames = frames_of(recording)
     with rr.RecordingStream("holdfast") as stream:
         stream.save(path, default_blueprint=blueprint(tracks, frames))
         stream.send_recording_name(recording.name)

@@ -91,7 +91,7 @@ class RerunPublisher(Openable):
             for name, sensor in self._stream.fingers.items()
         }
         recording = Recording("live", modules)
-        frames, _ = frames_of(recording)
+        frames = frames_of(recording)
         layout = blueprint(("force", *QUANTITIES), frames)
         url = f"rerun+http://127.0.0.1:{self._port}/proxy"
         self._view.connect_grpc(url, default_blueprint=layout)

@@ -1,1 +1,1 @@
-"""What viewers of other programs show of a recording: frames, arrows, series and events."""
+"""What Rerun shows of a recording: frames, arrows, series and events."""

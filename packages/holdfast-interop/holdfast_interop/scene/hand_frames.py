@@ -56,8 +56,8 @@ def module_frame(module: str) -> str:
     return f"module/{module}"
 
 
-def frames_of(recording: Recording) -> tuple[list[Frame], str]:
-    """Return the frames of all modules, parents first, and in words where they are from.
+def frames_of(recording: Recording) -> list[Frame]:
+    """Return the frames of all modules, parents first.
 
     Measured poses of the fingertips (`tip_pose` of the truth) come first, then the built-in
     Allegro hand with its measured joints or, without them, with straight fingers. All other
@@ -74,7 +74,7 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
             frames = [Frame(module_frame(f), WORLD, truth.times, tips[f]) for f in tips]
             rest = [name for name in recording.modules if name not in tips]
             frames += object_frames(recording)
-            return [*frames, *side_by_side(recording, rest)], "measured poses"
+            return [*frames, *side_by_side(recording, rest)]
     known = hand(ALLEGRO)
     # By name and sensor: a pad of another hand may have the name of one of this.
     on_hand = [
@@ -84,8 +84,8 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
     ]
     rest = [name for name in recording.modules if name not in on_hand]
     if not on_hand:
-        return [*side_by_side(recording, rest), *object_frames(recording)], "side by side"
-    times, joints, origin = hand_joints(recording)
+        return [*side_by_side(recording, rest), *object_frames(recording)]
+    times, joints = hand_joints(recording)
     tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
     mounts: dict[str, tuple[str, RigidPose]] = {}
     for name in on_hand:
@@ -112,7 +112,7 @@ def frames_of(recording: Recording) -> tuple[list[Frame], str]:
     ]
     # Where the palm is in the world is not known: it stands at the origin.
     palm = Frame(PALM_LINK, WORLD, times[:1], np.array([_pose((np.zeros(3), np.eye(3)))]))
-    return [palm, *frames, *side_by_side(recording, rest)], origin
+    return [palm, *frames, *side_by_side(recording, rest)]
 
 
 def quaternions(rotations: Array) -> Array:
@@ -162,14 +162,14 @@ def allegro_links(joints: Array) -> dict[str, RigidPose]:
     return poses
 
 
-def hand_joints(recording: Recording) -> tuple[Array, Array, str]:
-    """Return times (n,) [s] and joints (n, 16) [rad] of the hand, and where they are from."""
+def hand_joints(recording: Recording) -> tuple[Array, Array]:
+    """Return times (n,) [s] and joints (n, 16) [rad] of the hand."""
     truth = recording.truth
     if truth is not None and len(truth.times):
         joints = truth.hand.get("joints")
         if joints is not None and joints.shape[1:] == (N_ALLEGRO_JOINTS,):
-            return truth.times, joints.astype(np.float64), "measured joints"
-    return np.array([recording.start]), np.zeros((1, N_ALLEGRO_JOINTS)), "straight fingers"
+            return truth.times, joints.astype(np.float64)
+    return np.array([recording.start]), np.zeros((1, N_ALLEGRO_JOINTS))
 
 
 def _pose(pose: RigidPose) -> Array:

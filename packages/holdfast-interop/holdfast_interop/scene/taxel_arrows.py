@@ -112,18 +112,3 @@ def arrow_scale(arrows: dict[str, ModuleArrows]) -> float:
     # A quantile: a single wrong reading would make all other arrows invisible.
     strong = float(np.quantile(joined, STRONG_SHARE)) if len(joined) else 0.0
     return LONGEST_ARROW / strong if strong > 0 else 0.0
-
-
-def orientations(directions: Array) -> Array:
-    """Return quaternions x y z w that turn the x axis to unit vectors, (n, 3) to (n, 4).
-
-    Example:
-        >>> orientations(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])).tolist()
-        [[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]
-    """
-    x, y, z = directions.T
-    # Half way between the x axis and the direction: no angle is computed. Against the x axis
-    # every axis of rotation is right, and half a turn about z is taken.
-    turned = np.column_stack([np.zeros_like(x), -z, y, 1 + x])
-    turned[x < 1e-9 - 1] = (0.0, 0.0, 1.0, 0.0)
-    return np.asarray(turned / np.linalg.norm(turned, axis=1, keepdims=True)) + 0.0

@@ -41,37 +41,16 @@ def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):
         assert back.modules["thumb"].labels == first.modules["thumb"].labels
 
 
-def test_files_for_foxglove_have_a_layout(capsys, grasps, tmp_path):
-    out = tmp_path / "view"
-    document = exported(
-        capsys, grasps, out, "--format", "foxglove", "--model", "builtin:noise-floor"
-    )
-    assert document["files"] == 2
-    assert document["layout"] == str(out / "holdfast-layout.json")
-    names = sorted(path.name for path in out.iterdir())
-    assert names == ["grasp0.mcap", "grasp1.mcap", "holdfast-layout.json"]
-
-
-def test_a_model_that_does_not_fit_leaves_nothing(capsys, grasps, tmp_path):
-    message = refusal(
-        capsys, grasps, tmp_path / "out", "--format", "foxglove", "--model", tmp_path / "no.json"
-    )
-    assert "no.json" in message
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_options_must_fit(capsys, grasps, tmp_path):
     out = tmp_path / "out"
     cases = {
         ("--format", "csv", "--fps", "3"): "--fps belongs to --format lerobot; csv given",
-        ("--format", "csv", "--model", "x"): "--model belongs to --format foxglove; csv given",
+        ("--format", "csv", "--model", "x"): "--model belongs to --format rerun; csv given",
         ("--format", "lerobot", "--fps", "0"): "--fps: a whole number from 1 to 1000 expected, 0 "
         "given",
     }
     for words, message in cases.items():
         assert refusal(capsys, grasps, out, *words) == message
-    message = refusal(capsys, grasps, tmp_path / "a.mcap", "--format", "foxglove")
-    assert (
-        message == f"{tmp_path / 'a.mcap'}: a folder expected for the format foxglove, a file given"
-    )
+    message = refusal(capsys, grasps, tmp_path / "a.mcap", "--format", "rerun")
+    assert message == f"{tmp_path / 'a.mcap'}: a folder expected for the format rerun, a file given"
     assert list(tmp_path.iterdir()) == []

@@ -30,15 +30,14 @@ def export(
     needs the fingers of the hand, from a recording or from --sensor and --fingers.
 
     Recordings need --format: lerobot is a LeRobot data set (v3.0), which holdfast import brings
-    back without loss; foxglove is MCAP files with plots, states, a log and an arrow for each
-    taxel, and a layout for them; rerun is the same for Rerun; csv is the generic CSV of
-    docs/importing.md.
+    back without loss; rerun is files for Rerun with plots, states, a log and an arrow for each
+    taxel; csv is the generic CSV of docs/importing.md.
 
     Example:
       holdfast export builtin:twin model.h --like grasp.parquet
       holdfast export builtin:any model.h --sensor uskin-curved --fingers 4
       holdfast export grasps/ dataset/ --format lerobot
-      holdfast export grasp.parquet view/ --format foxglove --model builtin:any
+      holdfast export grasp.parquet view/ --format rerun --model builtin:any
       holdfast export grasp.parquet grasp.csv --format csv
     """
     # The suffix of `out` decides as well: a wrong model is then refused as a model.
