@@ -36,6 +36,13 @@ class FormatOptions:
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False
+    no_limit: Annotated[
+        bool,
+        typer.Option(
+            "--no-limit",
+            help="Read files of your own that take more than 1 GiB of memory, or 120 s.",
+        ),
+    ] = False
     suffix: Annotated[
         RecordingFormat | None,
         typer.Option(
@@ -54,7 +61,7 @@ class FormatOptions:
 
         task = ImportTask(
             out, self.data_format, parse_sensors(self.sensor or ()), self.columns,
-            labels=not self.no_labels, force=force,
+            labels=not self.no_labels, force=force, limited=not self.no_limit,
         )  # fmt: skip
         # Without the option, the task chooses the format by what is installed.
         return task if self.suffix is None else replace(task, suffix=self.suffix)
