@@ -110,22 +110,23 @@ def read_foreign(
         header = decode_header(document, path)
         pairs = zip(arrays[::2], arrays[1::2], strict=True)
         topics = (spec.topic for spec in array_specs(header))
-        recording = recording_from(header, dict(zip(topics, pairs, strict=True)), path)
-        # Header and arrays are matched by their order alone; the digest guards it.
-        if recording.digest != header.digest:
-            raise RecordingError(f"{path}: the recording is another one than the child has read")
-        yield recording
+        yield recording_from(header, dict(zip(topics, pairs, strict=True)), path)
 
 
-def read_foreign_arrays(
-    task: str, path: Path, options: dict[str, Any]
+def read_foreign_poses(
+    path: Path, name: str, bodies: Mapping[str, str]
 ) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays by name, which a child process reads.
+    """Return poses (n, 8) by body, as `importers.read_poses`, which a child process reads.
+
+    Args:
+        path: path of the file or folder.
+        name: name of the format.
+        bodies: as in `importers.read_poses`.
 
     Raises:
         RecordingError: as `read_foreign`.
     """
-    ((document, arrays),) = _values(task, path, options)
+    ((document, arrays),) = _values("poses", path, {"format": name, "bodies": dict(bodies)})
     return dict(zip(msgspec.json.decode(document, type=list[str]), arrays, strict=True))
 
 
@@ -162,11 +163,8 @@ def read_stickers(
 
 
 def limits() -> dict[str, bool]:
-    """Return which limits hold on this system, by name; that of memory is tried."""
-    with suppress(RecordingError):
-        found = read_foreign_arrays("limits", Path(__file__), {})
-        return {name: bool(value) for name, value in found.items()}
-    return {"processor": False, "memory": False}
+    """Return which limits this system has, by name."""
+    return {"processor": os.name == "posix", "memory": sys.platform == "linux"}
 
 
 def _values(
@@ -406,24 +404,10 @@ def stickers_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays
         yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
 
 
-def limits_task(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    """Yield which limits hold; that of memory is tried."""
-    _limit_memory(request)
-    try:
-        # Twice the limit, so that it must fail where the limit holds.
-        np.empty(2 * MAX_MEMORY, np.uint8)
-        has_memory = False
-    except MemoryError:
-        has_memory = True
-    has_time = hasattr(signal, "SIGXCPU")
-    yield b'["processor","memory"]', [np.array(has_time), np.array(has_memory)]
-
-
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
     "import": import_task,
     "poses": poses_task,
     "stickers": stickers_task,
-    "limits": limits_task,
 }
 
 

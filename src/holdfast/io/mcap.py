@@ -38,9 +38,6 @@ from holdfast.io.timed_arrays import (
 )
 from holdfast.recordings import Recording
 
-MAX_SCHEMA_SIZE = 1 << 20
-"""Maximum size of a schema or channel [bytes]; those of recordings have less than a kilobyte."""
-
 
 class _Channel(NamedTuple):
     """Topic of messages, number of their schema, and whether they are counted."""
@@ -226,15 +223,11 @@ class _Channels:
 
     def add(self, opcode: int, content: bytes) -> None:
         """Keep what is needed of a record, if it is a schema or a channel."""
-        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
-            return
-        if len(content) > MAX_SCHEMA_SIZE:
-            raise ValueError(f"a schema or channel of {len(content)} bytes")
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
             self._schemas.setdefault(schema.id, schema.name)
-        else:
+        elif opcode == Opcode.CHANNEL:
             channel = Channel.read(stream)
             is_counted = channel.message_encoding == "cdr"
             self._channels.setdefault(

@@ -14,7 +14,7 @@ from typing import Any
 
 from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
-from holdfast.io.foreign import read_foreign, read_foreign_arrays
+from holdfast.io.foreign import read_foreign, read_foreign_poses
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, csv_files, name_prefixes
 from holdfast.io.safe_reading import recording_errors
@@ -150,7 +150,7 @@ def read_poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
     name = _format_of(path, None, None, None)
     if not hasattr(importer(name), "poses"):
         raise RecordingError(f"{path} is of the format {name}, from which no poses can be read")
-    return read_foreign_arrays("poses", path, {"format": name, "bodies": dict(bodies)})
+    return read_foreign_poses(path, name, bodies)
 
 
 def _format_of(

@@ -136,16 +136,9 @@ def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, Stor
 
     file = h5py.File(path, "r")  # open until the process has read what it needs
     found: dict[str, StoredArray] = {}
-    seen: set[int] = set()
     waiting: list[tuple[str, Any]] = [("", file["/"])]
     while waiting:
         name, group = waiting.pop()
-        address = h5py.h5o.get_info(group.id).addr
-        if address in seen:
-            if isinstance(group, h5py.Dataset):
-                found[name] = _refused(f"{path}: {name} is an array of another group too")
-            continue
-        seen.add(address)
         for key, value in group.attrs.items():
             if np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf":
                 found[f"{name}/{key}"] = in_memory(np.asarray(value))
