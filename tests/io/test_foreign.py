@@ -52,7 +52,7 @@ def test_whatever_a_library_does_is_one_line(file, monkeypatch, code, message):
     program = (
         "import os, numpy; from holdfast.io import foreign\n"
         "from holdfast.io.importers import xela_log\n"
-        "foreign.MAX_SECONDS = 1\n"
+        "foreign.MAX_CPU_SECONDS = 1\n"
         f"def read(path):\n    {code}\n    yield\n"
         "xela_log.read = read\n"
     )

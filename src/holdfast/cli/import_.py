@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.csv_options import ColumnsOption, SensorsOption, parse_sensors, report_findings
-from holdfast.cli.options import EngineOptions, ForceOption, JsonOption
+from holdfast.cli.options import RARE, EngineOptions, ForceOption, JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
@@ -42,6 +42,7 @@ class FormatOptions:
             "--no-limit",
             help="Read files of your own that take more than 1 GiB of memory, or 120 s.",
         ),
+        RARE,
     ] = False
     suffix: Annotated[
         RecordingFormat | None,

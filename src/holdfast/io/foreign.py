@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 MAX_MEMORY = 1 << 30
 """Memory that reading a file may take in the child [bytes]."""
-MAX_SECONDS = 120
+MAX_CPU_SECONDS = 120
 """Time of the processor until the next recording of a file, or part of a video [s]."""
 WAY_OUT = (
     "cut it into shorter files, or give `holdfast import` the option --no-limit for a file of your "
@@ -232,7 +232,7 @@ class _Child:
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
         if name == "SIGXCPU":  # the child has reached the limit that it set itself
             raise RecordingError(
-                f"{path} takes more than {MAX_SECONDS} s of the processor to read: {WAY_OUT}"
+                f"{path} takes more than {MAX_CPU_SECONDS} s of the processor to read: {WAY_OUT}"
             )
         # C++ libraries also abort where they get no memory; which of both it was cannot be told.
         memory = f", or needs more than 1 GiB of memory: {WAY_OUT}"
@@ -414,7 +414,7 @@ _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]]
 def _limit_time(request: _Request) -> None:
     """Limit the time of this process; that of the system counts from its start."""
     used = int(sum(os.times()[:2]))
-    _limit("CPU", used + MAX_SECONDS + 1 if request.limited else None)
+    _limit("CPU", used + MAX_CPU_SECONDS + 1 if request.limited else None)
 
 
 def _limit_memory(request: _Request) -> None:
