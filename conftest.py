@@ -36,7 +36,7 @@ hypothesis.settings.load_profile("checks" if os.environ.get("CI") else "home")
 
 collect_ignore = [] if find_spec("rerun") else ["packages/holdfast-interop/holdfast_interop/rerun"]
 """Modules that need a package of no group, see .ci/rerun."""
-SLOW_FOLDERS = ("tests/attack", "tests/cli/label", "tests/docs", "tests/examples")
+SLOW_FOLDERS = ("tests/cli/label", "tests/docs", "tests/examples")
 """Folders without quick tests."""
 SLOW_FILE = re.compile(
     r"^\s*(?:import|from) (?:asyncio|concurrent|cyclonedds|distributed|http|multiprocessing"

@@ -47,6 +47,7 @@ class ImportTask:
         labels: import the labels of the input.
         suffix: of the recordings to write, `parquet` or `mcap`.
         force: replace existing files.
+        limited: as in `import_recordings`.
     """
 
     out: Path
@@ -56,6 +57,7 @@ class ImportTask:
     labels: bool = True
     suffix: str = field(default_factory=lambda: "parquet" if is_installed("pyarrow") else "mcap")
     force: bool = False
+    limited: bool = True
 
 
 class ImportResult(NamedTuple):
@@ -173,6 +175,7 @@ def _import_part(
             sensors=task.sensors,
             columns=task.columns,
             report=report,
+            limited=task.limited,
         )
     written: list[Imported] = []
     for recording in recordings:

@@ -8,6 +8,7 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import main
+from holdfast.cli.import_ import FormatOptions
 from holdfast.io import load_recording, save_recording
 from holdfast.io.importers import FORMATS, HINTS, IMPORTER_PLUGINS, import_hint
 from holdfast.synthetic import synthetic_recording
@@ -43,6 +44,11 @@ def table(tmp_path):
 
 VERB = Verb("import")
 refusal, imported = VERB.refusal, VERB.document
+
+
+@pytest.mark.parametrize("no_limit", [False, True])
+def test_no_limit_reaches_the_reader(tmp_path, no_limit):
+    assert FormatOptions(no_limit=no_limit).task(tmp_path, force=False).limited is not no_limit
 
 
 def test_imports_a_file(capsys, table, tmp_path):

@@ -2,7 +2,7 @@ import re
 
 import pytest
 
-from holdfast.io.definitions import MAX_FIELDS, MessageField, field_paths, parse_definition
+from holdfast.io.definitions import MessageField, field_paths, parse_definition
 
 
 def nested(n_fields, depth):
@@ -32,16 +32,8 @@ def test_definitions():
     [
         ("uint8", "p/A: 'uint8' is no field of a message"),
         ("wstring x", "p/A: a field is of wstring, which is not defined"),
-        ("A x", "p/A holds itself, or is nested too deep"),
-        ("B[] x\n===\nMSG: p/B\nA[] y", "p/A holds itself, or is nested too deep"),
-        (nested(1, 9), "p/A holds itself, or is nested too deep"),
-        (
-            nested(30, 7),
-            "at most 4096 fields, nested 8 deep, expected; 27000 fields, nested",
-        ),
-        ("B[] x\n===\nMSG: p/B\n", "p/A: x is an array of p/B without fields"),
-        ("B[9] x\n===\nMSG: p/B\nC y\n===\nMSG: p/C\nint8 N=1", "x is an array of p/B without"),
-        ("int8 x\n" * 10_000, "p/A: at most 65536 characters expected, 70000 given"),
+        ("A x", "p/A holds itself"),
+        ("B[] x\n===\nMSG: p/B\nA[] y", "p/A holds itself"),
         ("int8[" + "9" * 5000 + "] x", "Exceeds the limit"),
     ],
 )
@@ -55,7 +47,6 @@ def test_shared_types_are_visited_once():
     definition = parse_definition("p/A", nested(4, 6))
     assert definition.sizes["p/A"] == 4**5
     assert len(field_paths(definition)) == 4**5
-    assert MAX_FIELDS == 4**6
 
 
 def test_the_sizes_are_those_of_the_shortest_messages():

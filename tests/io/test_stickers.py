@@ -93,19 +93,6 @@ def test_a_damaged_film_ends(film, tmp_path):
     assert len(times) <= N
 
 
-LIMITS = {
-    "MAX_VIDEO": (1000, r"run\.mp4 has 0\.\d+ MB; a video of at most \S+ MB expected: cut it"),
-    "MAX_PIXELS": (100, r"run\.mp4 has pictures of 320 x 240 pixels; at most 3840 x 2160 expected"),
-}
-
-
-@pytest.mark.parametrize(("name", "most", "message"), [(k, *v) for k, v in LIMITS.items()])
-def test_a_film_that_is_too_large_is_refused(film, monkeypatch, name, most, message):
-    monkeypatch.setattr(stickers, name, most)
-    with pytest.raises(RecordingError, match=message):
-        next(sticker_places(film))
-
-
 def test_a_missing_film(tmp_path):
     with pytest.raises(RecordingError, match=r"run\.mp4 does not exist; a video expected"):
         read_stickers(tmp_path / "run.mp4")

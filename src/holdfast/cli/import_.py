@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.csv_options import ColumnsOption, SensorsOption, parse_sensors, report_findings
-from holdfast.cli.options import EngineOptions, ForceOption, JsonOption
+from holdfast.cli.options import RARE, EngineOptions, ForceOption, JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
@@ -36,6 +36,14 @@ class FormatOptions:
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False
+    no_limit: Annotated[
+        bool,
+        typer.Option(
+            "--no-limit",
+            help="Read files of your own that take more than 1 GiB of memory, or 120 s.",
+        ),
+        RARE,
+    ] = False
     suffix: Annotated[
         RecordingFormat | None,
         typer.Option(
@@ -54,7 +62,7 @@ class FormatOptions:
 
         task = ImportTask(
             out, self.data_format, parse_sensors(self.sensor or ()), self.columns,
-            labels=not self.no_labels, force=force,
+            labels=not self.no_labels, force=force, limited=not self.no_limit,
         )  # fmt: skip
         # Without the option, the task chooses the format by what is installed.
         return task if self.suffix is None else replace(task, suffix=self.suffix)

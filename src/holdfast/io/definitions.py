@@ -34,13 +34,6 @@ FIELD_SIZES = {
 }
 """Minimum size of a value of each type that is no message [bytes]."""
 
-MAX_DEPTH = 8
-"""Maximum depth of messages inside messages."""
-MAX_TEXT_SIZE = 1 << 16
-"""Maximum number of characters of a definition."""
-MAX_FIELDS = 4096
-"""Maximum number of fields of a message, with the fields of messages inside it."""
-
 SEPARATOR = "\n" + "=" * 80 + "\nMSG: "
 """Text between the types of a definition; the name of the next type follows."""
 
@@ -52,14 +45,6 @@ ROS2_HEADER = (
     + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )
 """Definition of the header of a message, to append to a definition."""
-
-
-class _Extent(NamedTuple):
-    """Depth of a type, number of fields in it, and minimum size of its messages [bytes]."""
-
-    depth: int
-    n_fields: int
-    size: int
 
 
 _STAMPS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}
@@ -121,15 +106,12 @@ def parse_definition(name: str, text: str) -> Definition:
         text: text of the definition.
 
     Raises:
-        ValueError: a line is not a field; a type is not defined, holds itself or is nested too
-            deep; an array has elements without fields; or the definition is too large.
+        ValueError: a line is not a field, or a type is not defined or holds itself.
 
     Example:
         >>> parse_definition("pkg/Named", "string name\nfloat64[] values # [N]").fields[1]
         MessageField(name='values', kind='float64', size=0)
     """
-    if len(text) > MAX_TEXT_SIZE:
-        raise ValueError(f"{name}: at most {MAX_TEXT_SIZE} characters expected, {len(text)} given")
     first, *others = _SEPARATOR.split(text.replace("\r\n", "\n"))
     blocks = {short_name(name): first}
     pairs = zip(others[::2], others[1::2], strict=True)
@@ -158,9 +140,9 @@ def parse_definition(name: str, text: str) -> Definition:
                     raise ValueError(f"{block}: a field is of {short}, which is not defined")
             fields.append(MessageField(match["name"], kind, 0 if bounded else size))
         types[block] = tuple(fields)
-    extents: dict[str, _Extent] = {}
-    _measure(short_name(name), types, extents)
-    return Definition(short_name(name), types, {kind: one.size for kind, one in extents.items()})
+    sizes: dict[str, int] = {}
+    _measure(short_name(name), types, sizes)
+    return Definition(short_name(name), types, sizes)
 
 
 def field_paths(definition: Definition) -> set[str]:
@@ -187,31 +169,22 @@ def field_paths(definition: Definition) -> set[str]:
 def _measure(
     name: str,
     types: Mapping[str, tuple[MessageField, ...]],
-    extents: dict[str, _Extent],
+    sizes: dict[str, int],
     inside: tuple[str, ...] = (),
-) -> _Extent:
-    """Return the extent of a type, and add it to `extents`; each type is measured once.
+) -> int:
+    """Return the minimum size of a type, and add it to `sizes`; each type is measured once.
 
     Raises:
-        ValueError: a type holds itself, is nested too deep or has too many fields, or an array
-            has elements without fields, of which a short message could hold any number.
+        ValueError: a type holds itself.
     """
-    if name in inside or len(inside) > MAX_DEPTH:
-        raise ValueError(f"{(*inside, name)[0]} holds itself, or is nested too deep")
-    if name not in extents:
-        depth, n_fields, size = 0, 0, 0
+    if name in inside:
+        raise ValueError(f"{name} holds itself")
+    if name not in sizes:
+        size = 0
         for field in types[name]:
-            one = _Extent(0, 1, FIELD_SIZES.get(field.kind, 0))
-            if field.kind in types:
-                one = _measure(field.kind, types, extents, (*inside, name))
-            if field.size is not None and one.size == 0:
-                raise ValueError(f"{name}: {field.name} is an array of {field.kind} without fields")
-            depth, n_fields = max(depth, one.depth + 1), n_fields + one.n_fields
-            size += LENGTH_SIZE if field.size == 0 else one.size * (field.size or 1)
-        if depth > MAX_DEPTH + 1 or n_fields > MAX_FIELDS:
-            raise ValueError(
-                f"{name}: at most {MAX_FIELDS} fields, nested {MAX_DEPTH} deep, expected; "
-                f"{n_fields} fields, nested {depth - 1} deep, given"
-            )
-        extents[name] = _Extent(depth, n_fields, size)
-    return extents[name]
+            one = FIELD_SIZES.get(field.kind)
+            if one is None:
+                one = _measure(field.kind, types, sizes, (*inside, name))
+            size += LENGTH_SIZE if field.size == 0 else one * (field.size or 1)
+        sizes[name] = size
+    return sizes[name]

@@ -1,4 +1,4 @@
-"""Files of other programs, read in a child process with limits of time and memory.
+"""Files of other programs, read in a child process with one limit of memory and time.
 
 What reads them can abort (h5py, pyarrow), hang, or take all memory for a file that is damaged or
 made by an attacker. The child ends then, and this process has one line.
@@ -22,7 +22,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from shutil import rmtree
 from tempfile import mkdtemp
-from threading import Thread, Timer
+from threading import Thread
 from typing import TYPE_CHECKING, Any, BinaryIO, Literal
 
 import msgspec
@@ -32,15 +32,7 @@ import numpy.typing as npt
 from holdfast.children import python_command
 from holdfast.errors import EXTRA_MODULES, RecordingError
 from holdfast.io.header import decode_header, encode_header, header_of
-from holdfast.io.safe_reading import (
-    WAY_OUT,
-    ReadBudget,
-    given_limit,
-    megabytes,
-    recording_errors,
-    size_limit,
-    stored_size,
-)
+from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import array_specs, arrays_of, recording_from
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -48,17 +40,15 @@ from holdfast.sensors import Sensor
 if TYPE_CHECKING:
     from holdfast.io.importers.csv_columns import Columns
 
-FREE_SECONDS = 20.0
-"""Time of the processor that a file may take, however small it is [s]."""
-SECONDS_PER_BYTE = 4e-6
-"""Time of the processor for each byte of the file: a tenth of the speed of the slowest format,
-so that a slow computer imports it too [s]."""
-SECONDS_PER_VALUE = 1.0
-"""Time of the processor for each recording that came of the file [s]."""
-WAIT_FACTOR = 3
-"""Time until the next answer, as a multiple of that of the processor: disks are waited for."""
-START_TIMEOUT = 60.0
-"""Time in which the child must be ready; it takes 0.3 s if its modules are in memory [s]."""
+MAX_MEMORY = 1 << 30
+"""Memory that reading a file may take in the child [bytes]."""
+MAX_CPU_SECONDS = 120
+"""Time of the processor until the next recording of a file, or part of a video [s]."""
+WAY_OUT = (
+    "cut it into shorter files, or give `holdfast import` the option --no-limit for a file of your "
+    "own"
+)
+"""End of the message about a file that reaches a limit."""
 MAX_TEXT = 2000
 """Maximum length of the text of an error [characters]."""
 
@@ -73,14 +63,13 @@ Arrays = list[npt.NDArray[Any]]
 
 
 class _Request(msgspec.Struct, frozen=True):
-    """What the child shall read, with its limits; paths are relative to `folder`."""
+    """What the child shall read, and whether with limits; paths are relative to `folder`."""
 
     task: str
     path: bytes  # a name may be no UTF-8, which JSON cannot hold
     options: dict[str, Any]
     folder: bytes
-    memory: int  # [bytes]
-    seconds: float  # of the processor [s]
+    limited: bool
 
 
 class _Answer(msgspec.Struct, frozen=True):
@@ -96,6 +85,8 @@ def read_foreign(
     sensors: Mapping[str, Sensor] | None = None,
     columns: "Columns | None" = None,
     report: Callable[[str], None] = lambda _: None,
+    *,
+    limited: bool = True,
 ) -> Iterator[Recording]:
     """Yield the recordings in a file or folder of a format, which a child process reads.
 
@@ -105,35 +96,37 @@ def read_foreign(
         sensors: as in `importers.import_recordings`, of formats that take them.
         columns: the same.
         report: the same.
+        limited: the same.
 
     Raises:
         RecordingError: the child refuses it, ends, or takes more time or memory than it may.
     """
     given = {key: one.to_dict() for key, one in (sensors or {}).items()}
     options = {"format": name, "sensors": given, "columns": columns}
-    for document, arrays in _values("import", path, options):
+    for document, arrays in _values("import", path, options, limited=limited):
         if not arrays:
             report(os.fsdecode(document))
             continue
         header = decode_header(document, path)
         pairs = zip(arrays[::2], arrays[1::2], strict=True)
         topics = (spec.topic for spec in array_specs(header))
-        recording = recording_from(header, dict(zip(topics, pairs, strict=True)), path)
-        # Header and arrays are matched by their order alone; the digest guards it.
-        if recording.digest != header.digest:
-            raise RecordingError(f"{path}: the recording is another one than the child has read")
-        yield recording
+        yield recording_from(header, dict(zip(topics, pairs, strict=True)), path)
 
 
-def read_foreign_arrays(
-    task: str, path: Path, options: dict[str, Any]
+def read_foreign_poses(
+    path: Path, name: str, bodies: Mapping[str, str]
 ) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays by name, which a child process reads.
+    """Return poses (n, 8) by body, as `importers.read_poses`, which a child process reads.
+
+    Args:
+        path: path of the file or folder.
+        name: name of the format.
+        bodies: as in `importers.read_poses`.
 
     Raises:
         RecordingError: as `read_foreign`.
     """
-    ((document, arrays),) = _values(task, path, options)
+    ((document, arrays),) = _values("poses", path, {"format": name, "bodies": dict(bodies)})
     return dict(zip(msgspec.json.decode(document, type=list[str]), arrays, strict=True))
 
 
@@ -170,41 +163,32 @@ def read_stickers(
 
 
 def limits() -> dict[str, bool]:
-    """Return which limits hold on this system, by name; that of memory is tried."""
-    with suppress(RecordingError):
-        found = read_foreign_arrays("limits", Path(__file__), {})
-        return {"time": True, **{name: bool(value) for name, value in found.items()}}
-    return {"time": False}
+    """Return which limits this system has, by name."""
+    return {"processor": os.name == "posix", "memory": sys.platform == "linux"}
 
 
-def _values(task: str, path: Path, options: dict[str, Any]) -> Iterator[tuple[bytes, Arrays]]:
+def _values(
+    task: str, path: Path, options: dict[str, Any], *, limited: bool = True
+) -> Iterator[tuple[bytes, Arrays]]:
     """Yield the document and the arrays of each value that a child reads.
 
-    What is left of an iterator costs a child: it is ended with whatever it reads.
+    If the caller stops iterating, the child is killed.
     """
-    size = stored_size(path)
-    memory = size_limit(path)
-    # HOLDFAST_MAX_BYTES raises the time as well: what unpacks to more takes longer.
-    seconds = FREE_SECONDS + SECONDS_PER_BYTE * max(size, given_limit() or 0)
-    names = os.fsencode(path), os.fsencode(Path.cwd())
-    request = _Request(task, names[0], options, names[1], memory, seconds)
-    budget = ReadBudget(path)
+    request = _Request(task, os.fsencode(path), options, os.fsencode(Path.cwd()), limited)
     # A child is kept for the next file: a start takes 0.3 s.
     child = _idle.pop() if _idle else _Child()
     try:
-        answer = child.ask(msgspec.json.encode(request) + b"\n", path, request)
+        answer = child.ask(msgspec.json.encode(request) + b"\n", path)
         while answer.kind == "value":
-            yield child.value(budget)
-            answer = child.ask(_NEXT, path, request)
+            yield child.value()
+            answer = child.ask(_NEXT, path)
     except BaseException:  # also Ctrl-C, and an iterator that is left
         child.end()
         raise
     if answer.kind == "memory":
         child.end()  # what it could not use may be in pieces
-        raise RecordingError(
-            f"{path} needs more memory than the {megabytes(memory)} that a file of "
-            f"{megabytes(size)} may take; {WAY_OUT}"
-        )
+        needs = f"{path} needs more than 1 GiB of memory: {WAY_OUT}"
+        raise RecordingError(needs if limited else answer.text)
     _idle.append(child)
     if answer.kind == "error":
         raise RecordingError(answer.text)
@@ -219,8 +203,6 @@ class _Child:
 
     def __init__(self) -> None:
         self._folder = mkdtemp(prefix="holdfast-")
-        # Set by the timer that kills the process: without it, this would look like a crash.
-        self._is_late = False
         try:
             self._process = subprocess.Popen(
                 python_command(_PROGRAM, self._folder),
@@ -231,41 +213,37 @@ class _Child:
         except OSError as cause:
             rmtree(self._folder, ignore_errors=True)
             raise RecordingError(f"no process for reading can be started: {cause}") from cause
-        if self._answer(START_TIMEOUT) is None:
+        if self._answer() is None:
             self.end()
             raise RecordingError("the process for reading does not start")
 
-    def ask(self, line: bytes, path: Path, request: _Request) -> _Answer:
+    def ask(self, line: bytes, path: Path) -> _Answer:
         """Return the answer to a line.
 
         Raises:
-            RecordingError: the child ends, or does not answer in time.
+            RecordingError: the child ends.
         """
         with suppress(OSError):  # it has ended: there is no answer
             _pipe(self._process.stdin).write(line)
             _pipe(self._process.stdin).flush()
-        timeout = WAIT_FACTOR * request.seconds
-        if answer := self._answer(timeout):
+        if answer := self._answer():
             return answer
         code = self._process.wait()
-        # SIGXCPU: the child has reached the limit of the processor that it set itself.
-        if self._is_late or code == -getattr(signal, "SIGXCPU", 0):
-            raise RecordingError(
-                f"{path} takes too long to read: {request.seconds:.0f} s of the processor, and "
-                f"{timeout:.0f} s until the next recording, are allowed for a file of its size"
-            )
         name = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        if name == "SIGXCPU":  # the child has reached the limit that it set itself
+            raise RecordingError(
+                f"{path} takes more than {MAX_CPU_SECONDS} s of the processor to read: {WAY_OUT}"
+            )
         # C++ libraries also abort where they get no memory; which of both it was cannot be told.
-        memory = f", or needs more than {megabytes(request.memory)} of memory; {WAY_OUT}"
+        memory = f", or needs more than 1 GiB of memory: {WAY_OUT}"
         raise RecordingError(
             f"{path} is damaged: it ended the process that read it ({name})"
             + (memory if name == "SIGABRT" else "")
         )
 
-    def value(self, budget: ReadBudget) -> tuple[bytes, Arrays]:
-        """Return the document and the arrays that the child wrote, which count in a budget."""
+    def value(self) -> tuple[bytes, Arrays]:
+        """Return the document and the arrays that the child wrote."""
         path = Path(self._folder, _VALUE_FILE)
-        budget.unpack(path.stat().st_size)
         arrays: Arrays = []
         with path.open("rb") as file:
             while file.peek(1):
@@ -282,24 +260,10 @@ class _Child:
                 _pipe(pipe).close()
         rmtree(self._folder, ignore_errors=True)
 
-    def _answer(self, timeout: float) -> _Answer | None:
-        """Return the next answer; None if there is none in time, and the process has ended."""
-
-        def give_up() -> None:
-            self._is_late = True
-            self._process.kill()
-
-        # Not every system reads a pipe with a timeout; the end of the process ends the reading.
-        timer = Timer(timeout, give_up)
-        # The timer must not keep this process alive after its end.
-        timer.daemon = True
-        timer.start()
-        try:
-            return msgspec.json.decode(_pipe(self._process.stdout).readline(), type=_Answer)
-        except msgspec.DecodeError:
-            return None
-        finally:
-            timer.cancel()
+    def _answer(self) -> _Answer | None:
+        """Return the next answer; None if the process has ended."""
+        line = _pipe(self._process.stdout).readline()
+        return msgspec.json.decode(line, type=_Answer) if line.endswith(b"\n") else None
 
 
 _idle: list[_Child] = []
@@ -375,18 +339,15 @@ def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
 
 
 def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    """Yield the values of a request; the time that it may take grows with each of them."""
+    """Yield the values of a request; each may take the same time."""
     # The working folder of the parent may have changed since the child began.
     os.chdir(os.fsdecode(request.folder))
-    # The limit of the system counts from the start of the process, so it moves with each file.
-    end = sum(os.times()[:2]) + request.seconds
-    _limit("CPU", int(end) + 1)
+    _limit_time(request)
     path = Path(os.fsdecode(request.path))
     with recording_errors(path):
         for value in _TASKS[request.task](path, request):
             yield value
-            end += SECONDS_PER_VALUE
-            _limit("CPU", int(end) + 1)
+            _limit_time(request)
 
 
 def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
@@ -443,43 +404,38 @@ def stickers_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays
         yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
 
 
-def limits_task(_: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    """Yield which limits hold; that of memory is tried."""
-    _limit_memory(request)
-    try:
-        # Twice the limit, so that it must fail where the limit holds.
-        np.ones(2 * request.memory, np.uint8)
-        has_memory = False
-    except MemoryError:
-        has_memory = True
-    has_time = hasattr(signal, "SIGXCPU")
-    yield b'["processor","memory"]', [np.array(has_time), np.array(has_memory)]
-
-
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {
     "import": import_task,
     "poses": poses_task,
     "stickers": stickers_task,
-    "limits": limits_task,
 }
 
 
+def _limit_time(request: _Request) -> None:
+    """Limit the time of this process; that of the system counts from its start."""
+    used = int(sum(os.times()[:2]))
+    _limit("CPU", used + MAX_CPU_SECONDS + 1 if request.limited else None)
+
+
 def _limit_memory(request: _Request) -> None:
-    """Limit the memory of this process to what it has and that of the request, and its files."""
+    """Limit the memory of this process to what it has and that of a file, and its files."""
     _limit("CORE", 0)  # a crash leaves no image of the memory in the folder of the user
-    _limit("FSIZE", request.memory)  # of values, which the parent reads into its memory
+    # Of values, which the parent reads into its memory.
+    _limit("FSIZE", MAX_MEMORY if request.limited else None)
     with suppress(OSError):  # there is no such file: only Linux has this limit
         status = Path("/proc/self/status").read_text()
         (used,) = re.findall(r"^VmData:\s+(\d+) kB", status, re.MULTILINE)
-        _limit("DATA", 1024 * int(used) + request.memory)  # addresses without memory are free
+        # Addresses without memory are free.
+        _limit("DATA", 1024 * int(used) + MAX_MEMORY if request.limited else None)
 
 
-def _limit(name: str, value: int) -> None:
-    """Set a limit of this process where the system has it; the next request can raise it."""
+def _limit(name: str, value: int | None) -> None:
+    """Set a limit of this process where the system has it; None for the highest."""
     if os.name == "posix":
         import resource
 
         kind = getattr(resource, f"RLIMIT_{name}")
         hard = resource.getrlimit(kind)[1]
-        value = value if hard == resource.RLIM_INFINITY else min(value, hard)
+        if value is None or (hard != resource.RLIM_INFINITY and value > hard):
+            value = hard
         resource.setrlimit(kind, (value, hard))

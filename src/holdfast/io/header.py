@@ -24,6 +24,8 @@ NUMBER_TYPES: tuple[str, ...] = get_args(NumberType)
 
 MAX_VALUES = 1 << 20
 """Maximum number of values of an array at one time."""
+MAX_HEADER_SIZE = 1 << 25
+"""Maximum size of a header [bytes]; in memory, its JSON takes up to 32 times as much."""
 Count = Annotated[int, msgspec.Meta(ge=0, lt=1 << 48)]
 Shape = Annotated[
     list[Annotated[int, msgspec.Meta(ge=0, le=MAX_VALUES)]], msgspec.Meta(max_length=8)
@@ -157,8 +159,12 @@ def decode_header(data: bytes | str, path: Path) -> Header:
         path: path of the file, for the error message.
 
     Raises:
-        RecordingError: the JSON is not a header, or has another schema.
+        RecordingError: the JSON is not a header, has another schema, or is too large.
     """
+    if len(data) > MAX_HEADER_SIZE:
+        raise RecordingError(
+            f"{path}: a header of {len(data)} bytes given, at most {MAX_HEADER_SIZE} expected"
+        )
     try:
         header = msgspec.json.decode(data, type=Header)
         # Only to refuse it here: what a sensor accepts is checked by `Sensor`, not by the schema.

@@ -26,15 +26,8 @@ from holdfast.io.mcap_writer import (
     MESSAGE_SECONDS,
     MessageLog,
 )
-from holdfast.io.safe_reading import (
-    JSON_EXPANSION,
-    PARTS_WAY_OUT,
-    WORK_PER_SAMPLE,
-    ReadBudget,
-    one_line,
-)
+from holdfast.io.safe_reading import check_size, one_line
 from holdfast.io.timed_arrays import (
-    TACTILE,
     TRUTH,
     TimedArray,
     TimedArrays,
@@ -44,9 +37,6 @@ from holdfast.io.timed_arrays import (
     time_spans,
 )
 from holdfast.recordings import Recording
-
-MAX_SCHEMA_SIZE = 1 << 20
-"""Maximum size of a schema or channel [bytes]; those of recordings have less than a kilobyte."""
 
 
 class _Channel(NamedTuple):
@@ -103,10 +93,9 @@ def load(path: Path) -> Recording:
     Raises:
         RecordingError: the file is damaged or not a recording, or nothing can be recovered.
     """
-    budget = ReadBudget(path, PARTS_WAY_OUT)
     complete = _is_complete(path)
-    messages = _messages(path, complete, budget)
-    header = _header(path, messages, complete, budget)
+    messages = _messages(path, complete)
+    header = _header(path, messages, complete)
     specs = array_specs(header)
     # A module without samples has an empty array of its number type; a file recorded live names
     # no types, and has only the arrays of modules with samples.
@@ -114,10 +103,11 @@ def load(path: Path) -> Recording:
         spec.topic: [(np.empty(0), spec.empty())] if spec.number else [] for spec in specs
     }
     markers: list[tuple[float, str]] = []
-    size = _JoinedSize(budget)
-    for topic, samples in _samples(path, header, _with_markers(messages, markers, budget)):
+    n_bytes = 0
+    for topic, samples in _samples(path, header, _with_markers(messages, markers)):
         parts[topic].append(samples)
-        size.add(topic, samples)
+        n_bytes += sum(array.nbytes for array in samples)
+        check_size(path, n_bytes)
     arrays = {
         topic: (
             np.concatenate([times for times, _ in samples]),
@@ -146,16 +136,15 @@ def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
     Raises:
         RecordingError: as in `load`.
     """
-    budget = ReadBudget(path)
     complete = _is_complete(path)
-    messages = _messages(path, complete, budget)
-    header = _header(path, messages, complete, budget)
+    messages = _messages(path, complete)
+    header = _header(path, messages, complete)
     markers: list[tuple[float, str]] = []
     # Markers may stand anywhere in the file, and the header needs all: so it is read twice.
-    for _ in _with_markers(messages, markers, budget):
+    for _ in _with_markers(messages, markers):
         pass
     header = msgspec.structs.replace(header, markers=markers)
-    samples = _samples(path, header, _messages(path, complete, ReadBudget(path)))
+    samples = _samples(path, header, _messages(path, complete))
     return header, ({topic: pair} for topic, pair in samples), complete
 
 
@@ -183,13 +172,10 @@ def _is_complete(path: Path) -> bool:
     return complete
 
 
-def _header(
-    path: Path, messages: Iterator[_McapMessage], complete: bool, budget: ReadBudget
-) -> Header:
+def _header(path: Path, messages: Iterator[_McapMessage], complete: bool) -> Header:
     """Return the header, which is in the first message."""
     first = next(messages, None)
     if first is not None and first.topic == HEADER_TOPIC:
-        budget.keep(JSON_EXPANSION * len(first.data))
         return decode_header(decode_text(first.data)[1], path)
     if complete:
         raise RecordingError(f"{path} is an MCAP file but no recording of holdfast")
@@ -197,12 +183,11 @@ def _header(
 
 
 def _with_markers(
-    messages: Iterator[_McapMessage], markers: list[tuple[float, str]], budget: ReadBudget
+    messages: Iterator[_McapMessage], markers: list[tuple[float, str]]
 ) -> Iterator[_McapMessage]:
     """Yield all messages but markers, which are appended to the list."""
     for message in messages:
         if message.topic == MARKERS_TOPIC:
-            budget.keep(len(message.data), 1)
             markers.append(decode_text(message.data))
         else:
             yield message
@@ -232,29 +217,22 @@ def _samples(
 class _Channels:
     """Channels and names of schemas of a file, by their numbers."""
 
-    def __init__(self, budget: ReadBudget) -> None:
-        self._budget = budget
+    def __init__(self) -> None:
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, _Channel] = {}
 
     def add(self, opcode: int, content: bytes) -> None:
         """Keep what is needed of a record, if it is a schema or a channel."""
-        if opcode not in (Opcode.SCHEMA, Opcode.CHANNEL):
-            return
-        if len(content) > MAX_SCHEMA_SIZE:
-            raise ValueError(f"a schema or channel of {len(content)} bytes")
         stream = ReadDataStream(BytesIO(content))
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(stream)
-            if schema.id not in self._schemas:
-                self._budget.keep(len(schema.name), 1)
-                self._schemas[schema.id] = schema.name
-        else:
+            self._schemas.setdefault(schema.id, schema.name)
+        elif opcode == Opcode.CHANNEL:
             channel = Channel.read(stream)
-            if channel.id not in self._channels:
-                self._budget.keep(len(channel.topic), 1)
-                is_counted = channel.message_encoding == "cdr"
-                self._channels[channel.id] = _Channel(channel.topic, channel.schema_id, is_counted)
+            is_counted = channel.message_encoding == "cdr"
+            self._channels.setdefault(
+                channel.id, _Channel(channel.topic, channel.schema_id, is_counted)
+            )
 
     def of(self, message: Message) -> tuple[_Channel, str]:
         """Return the channel of a message and the name of its schema.
@@ -268,41 +246,13 @@ class _Channels:
         return channel, self._schemas[channel.schema_id]
 
 
-class _JoinedSize:
-    """Size in memory of arrays that are read in parts; texts are as long as the longest.
-
-    All count twice: the parts, and the arrays that are joined of them. After that, the memory of
-    the parts is free for what verbs compute, which may need more of it.
-    """
-
-    def __init__(self, budget: ReadBudget) -> None:
-        self._budget = budget
-        self._texts: dict[str, tuple[int, int]] = {}
-
-    def add(self, topic: str, samples: TimedArray) -> None:
-        """Add a part of an array.
-
-        Raises:
-            RecordingError: the arrays are too large.
-        """
-        times, values = samples
-        n_bytes = times.nbytes + values.nbytes
-        if values.dtype.kind == "U":
-            n, width = self._texts.get(topic, (0, 0))
-            widest = max(width, values.itemsize)
-            self._texts[topic] = n + values.size, widest
-            n_bytes += (n + values.size) * widest - n * width - values.nbytes
-        work = WORK_PER_SAMPLE * len(times) if topic.startswith(TACTILE) else 0
-        self._budget.keep(n_bytes + max(n_bytes, work), 1)
-
-
-def _messages(path: Path, complete: bool, budget: ReadBudget) -> Iterator[_McapMessage]:
+def _messages(path: Path, complete: bool) -> Iterator[_McapMessage]:
     """Yield the messages with valid checksums in order; a missing number is damage."""
-    channels = _Channels(budget)
+    channels = _Channels()
     expected = 0
     try:
-        for chunk in read_chunks(path, complete, budget):
-            for opcode, content in records_in(chunk, budget):
+        for chunk in read_chunks(path, complete):
+            for opcode, content in records_in(chunk):
                 if opcode != Opcode.MESSAGE:
                     channels.add(opcode, content)
                     continue

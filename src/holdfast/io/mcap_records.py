@@ -20,7 +20,7 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC as MAGIC
 
 from holdfast.errors import RecordingError
-from holdfast.io.safe_reading import ReadBudget, one_line
+from holdfast.io.safe_reading import one_line
 
 MAX_CHUNK_SIZE = 1 << 28
 """Maximum size of a chunk before and after unpacking, in bytes; a larger one is refused."""
@@ -36,13 +36,12 @@ _HEAD_SIZE = 64
 """Number of bytes of a record that are needed to compare its lengths."""
 
 
-def read_chunks(path: Path, complete: bool, budget: ReadBudget) -> Iterator[bytes]:
+def read_chunks(path: Path, complete: bool) -> Iterator[bytes]:
     """Yield the unpacked bytes of each chunk; for a cut file, of each chunk before the cut.
 
     Args:
         path: path of the file.
         complete: whether the file has its end, so that `check_checksums` has checked it.
-        budget: of the file.
 
     Raises:
         RecordingError: the file is damaged.
@@ -53,7 +52,6 @@ def read_chunks(path: Path, complete: bool, budget: ReadBudget) -> Iterator[byte
             raise RecordingError(f"{path} is no MCAP file, or its first bytes are damaged")
         while len(record := file.read(_RECORD.size)) == _RECORD.size:
             opcode, length = _RECORD.unpack(record)
-            budget.step()
             start, end = file.tell(), file.tell() + length
             head = file.read(min(length, _HEAD_SIZE))
             if not complete and not _is_plausible(opcode, length, head):
@@ -69,7 +67,7 @@ def read_chunks(path: Path, complete: bool, budget: ReadBudget) -> Iterator[byte
                 return
             if opcode == Opcode.CHUNK:
                 try:
-                    data = _unpacked(head + file.read(length - len(head)), budget)
+                    data = _unpacked(head + file.read(length - len(head)))
                 except (McapError, ValueError, MemoryError, OverflowError, struct.error) as cause:
                     if not complete and _is_blank(file, end):
                         return
@@ -81,16 +79,14 @@ def read_chunks(path: Path, complete: bool, budget: ReadBudget) -> Iterator[byte
             file.seek(end)
 
 
-def records_in(data: bytes, budget: ReadBudget) -> Iterator[tuple[int, bytes]]:
+def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield the kind and the content of each record in the bytes of a chunk.
 
     Raises:
-        RecordingError: there are more records than such a file may have.
         ValueError: a record is longer than the chunk.
     """
     place = 0
     while place < len(data):
-        budget.step()
         opcode, length = _RECORD.unpack_from(data, place)
         place += _RECORD.size + length
         if place > len(data):
@@ -186,7 +182,7 @@ def _is_blank(file: BinaryIO, place: int) -> bool:
     return True
 
 
-def _unpacked(data: bytes, budget: ReadBudget) -> bytes:
+def _unpacked(data: bytes) -> bytes:
     """Return the bytes in a chunk, whose checksum is right."""
     chunk = Chunk.read(ReadDataStream(BytesIO(data)))
     if chunk.compression not in ("", "zstd"):
@@ -203,7 +199,6 @@ def _unpacked(data: bytes, budget: ReadBudget) -> bytes:
             and not 0 <= zstandard.frame_content_size(chunk.data) <= chunk.uncompressed_size
         ):
             raise ValueError("its packed size contradicts its size")
-        budget.unpack(max(chunk.uncompressed_size, len(chunk.data)))
         stream, n_bytes = get_chunk_data_stream(chunk, validate_crc=True)
         return stream.read(n_bytes)
     except zstandard.ZstdError as cause:

@@ -24,14 +24,7 @@ from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.arrow_arrays import arrow_column, arrow_type, component_rows
 from holdfast.io.header import Header, decode_header, encode_header, header_of
-from holdfast.io.safe_reading import (
-    JSON_EXPANSION,
-    PARTS_WAY_OUT,
-    WORK_PER_SAMPLE,
-    ReadBudget,
-    check_size,
-    one_line,
-)
+from holdfast.io.safe_reading import check_size, one_line
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
     ArraySpec,
@@ -126,13 +119,9 @@ def load(path: Path) -> Recording:
     """
     header, file = _open(path)
     n_rows = file.metadata.num_rows
-    # Before any buffer is made: the arrays, and what verbs compute of the samples of modules.
-    n_bytes = 0
-    for spec in array_specs(header):
-        work = 0 if spec.track == "truth" else WORK_PER_SAMPLE
-        n_bytes += (spec.n or 0) * (_value_size(spec) + work)
-    check_size(path, n_bytes, PARTS_WAY_OUT)
-    buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in array_specs(header)}
+    specs = array_specs(header)
+    check_size(path, sum((spec.n or 0) * _value_size(spec) for spec in specs))
+    buffers = {spec.topic: _ArrayBuffer(spec, n_rows, path) for spec in specs}
     for arrays in _groups(header, file, path):
         for topic, (times, values) in arrays.items():
             buffers[topic].append(times, values)
@@ -198,7 +187,6 @@ def write_checksum(path: Path) -> None:
 
 
 def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
-    budget = ReadBudget(path)
     size = path.stat().st_size
     if size == 0:
         raise RecordingError(f"{path} is empty (0 bytes); a Parquet recording expected")
@@ -233,7 +221,6 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     except (pa.ArrowException, OSError) as cause:
         raise RecordingError(f"{path} is damaged: {one_line(cause)}") from cause
     header = (table.metadata.metadata or {}).get(HEADER_KEY.encode(), b"")
-    budget.keep(JSON_EXPANSION * len(header))
     return decode_header(header, path), table
 
 
@@ -344,15 +331,12 @@ class _GroupReader:
         self._path = path
         self._order = order
         # All groups are checked before the first is read; a group of few bytes may claim any size.
-        budget = ReadBudget(path)
-        for number in range(file.num_row_groups):
-            group = file.metadata.row_group(number)
-            if group.num_rows > GROUP_ROWS:
-                raise RecordingError(
-                    f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
-                    f"{group.num_rows} given"
-                )
-            budget.unpack(max(group.num_rows * group.num_columns * 8, group.total_byte_size))
+        groups = map(file.metadata.row_group, range(file.num_row_groups))
+        if (n_rows := max((group.num_rows for group in groups), default=0)) > GROUP_ROWS:
+            raise RecordingError(
+                f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
+                f"{n_rows} given"
+            )
 
     def __call__(
         self, group: int, specs: list[ArraySpec], names: list[str] | None = None

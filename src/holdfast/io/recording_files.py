@@ -10,7 +10,7 @@ import numpy as np
 
 from holdfast.errors import OutputError, RecordingError, require_extras
 from holdfast.io.label_files import labels_for, labels_path
-from holdfast.io.safe_reading import ReadBudget, recording_errors
+from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import (
     TACTILE,
     TimedArray,
@@ -163,7 +163,7 @@ def _chunks(
             file_labels = labels_for(path, digest or file_format.load(path).digest)
         # A marker may be set for an earlier time than the one before.
         markers = sorted(header.markers)
-        for arrays, end in _chunk_arrays(groups, n_samples, path):
+        for arrays, end in _chunk_arrays(groups, n_samples):
             n_markers = sum(marker[0] < end for marker in markers)
             part = msgspec.structs.replace(header, markers=markers[:n_markers])
             markers = markers[n_markers:]
@@ -178,17 +178,15 @@ def _chunks(
 
 
 def _chunk_arrays(
-    groups: Iterable[TimedArrays], n_samples: int, path: Path
+    groups: Iterable[TimedArrays], n_samples: int
 ) -> Iterator[tuple[TimedArrays, float]]:
     """Yield the arrays of each chunk, and the time at which the next chunk begins."""
     parts: list[TimedArrays] = []
-    budget = ReadBudget(path)
     n_buffered = dict[str, int]()
     for group in groups:
         parts.append(group)
-        for topic, (times, values) in group.items():
+        for topic, (times, _) in group.items():
             n_buffered[topic] = n_buffered.get(topic, 0) + len(times)
-            budget.keep(times.nbytes + values.nbytes, 1)
         n_tactile = (n for topic, n in n_buffered.items() if topic.startswith(TACTILE))
         if max(n_tactile, default=0) > n_samples:
             chunks = _split(_joined(parts), n_samples)
@@ -198,8 +196,6 @@ def _chunk_arrays(
             n_ready = int(np.searchsorted(starts[1:], newest - MAX_MODULE_LAG))
             yield from zip(chunks[:n_ready], starts[1:], strict=False)
             rest = _joined(chunks[n_ready:])
-            # The chunks that went out are the caller's; only what is buffered here counts.
-            budget = ReadBudget(path)
             parts, n_buffered = [rest], {topic: len(times) for topic, (times, _) in rest.items()}
     if parts:
         chunks = _split(_joined(parts), n_samples)

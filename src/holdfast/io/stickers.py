@@ -13,17 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
-from holdfast.io.safe_reading import megabytes
 
 Picture = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
-MAX_VIDEO = 4_000_000_000
-"""Largest video that is read [bytes]: an hour of a phone."""
 MAX_STAMPS = 50_000_000
 """Largest file of times of pictures [bytes]: four million pictures."""
-MAX_PIXELS = 3840 * 2160
-"""Most pixels of a picture."""
 PICTURES_PER_PART = 60
 """Pictures after which the places are passed on."""
 SEARCH_PICTURES, RARE_SEARCH_PICTURES = 3, 60
@@ -81,15 +76,10 @@ def sticker_places(
         it is not seen.
 
     Raises:
-        RecordingError: the file is no video that can be decoded here, or too large.
+        RecordingError: the file is no video that can be decoded here.
     """
     import cv2
 
-    if (size := path.stat().st_size) > MAX_VIDEO:
-        raise RecordingError(
-            f"{path} has {megabytes(size)}; a video of at most {megabytes(MAX_VIDEO)} expected: "
-            "cut it into shorter ones"
-        )
     # The stacks of more threads would count as memory of the child.
     cv2.setNumThreads(1)
     film = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
@@ -99,11 +89,6 @@ def sticker_places(
             "expected (`ffmpeg -i IN out.mp4` converts others)"
         )
     size_of = [int(film.get(k)) for k in (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT)]
-    if np.prod(size_of) > MAX_PIXELS:
-        raise RecordingError(
-            f"{path} has pictures of {size_of[0]} x {size_of[1]} pixels; at most 3840 x 2160 "
-            "expected"
-        )
     middle = (np.array(size_of) - 1) / 2
     search = _Search()
     times: list[float] = []

@@ -20,7 +20,6 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.importers import IN_CONTACT
 from holdfast.io.importers.table import SLIPPED, natural_order, read_table
-from holdfast.io.safe_reading import ReadBudget
 from holdfast.recordings import STARTS_LOADED, Recording, Tactile
 from holdfast.sensors import sensor
 
@@ -37,8 +36,6 @@ ROW_SIZE = N_FINGERTIPS * N_MAGNETOMETERS * 3 * NUMBER_TYPE.itemsize
 """Size of the values of one instant [bytes]."""
 SEQUENCE_RATE = 100.0
 """Nominal rate; the files have no times [Hz]."""
-MAX_PICKLE_SIZE = 1 << 16
-"""Maximum size of the pickle of one tensor; it has some 200 [bytes]."""
 
 _ZIP_MAGIC = b"PK\x03\x04"
 _STORAGE = re.compile(rb"[A-Z][A-Za-z]{1,20}Storage\b")
@@ -104,17 +101,15 @@ def read_tensor(path: Path) -> npt.NDArray[np.float32]:
     Raises:
         RecordingError: the file is no such archive, or its values have another form.
     """
-    budget = ReadBudget(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            budget.keep(0, len(archive.infolist()))
             members = archive.infolist()
             # Byte order and number type, where the archive names them; nothing is unpickled.
             for info in members:
                 name = info.filename.rpartition("/")[2]
-                if name not in ("byteorder", "data.pkl") or info.file_size > MAX_PICKLE_SIZE:
+                if name not in ("byteorder", "data.pkl"):
                     continue
-                content = _content(path, archive, info, budget)
+                content = archive.read(info)
                 if name == "byteorder" and content.strip() != b"little":
                     raise RecordingError(
                         f"{path}: byte order {content[:20]!r} given, b'little' expected"
@@ -128,7 +123,7 @@ def read_tensor(path: Path) -> npt.NDArray[np.float32]:
                     f"{path}: one tensor, a member data/0, expected; {len(storages)} tensors given "
                     f"among {len(members)} members"
                 )
-            data = _content(path, archive, storages[0], budget)
+            data = archive.read(storages[0])
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as cause:
         raise RecordingError(f"{path} is cut or damaged: {cause}") from cause
     if not data or len(data) % ROW_SIZE:
@@ -144,23 +139,6 @@ def read_tensor(path: Path) -> npt.NDArray[np.float32]:
             f"{path}, row {row}, value {column}: {values[wrong[0]]} given, a finite number expected"
         )
     return values.reshape(-1, N_FINGERTIPS, N_MAGNETOMETERS, 3)
-
-
-def _content(
-    path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, budget: ReadBudget
-) -> bytes:
-    """Return the bytes of a member, which torch stores as they are.
-
-    Raises:
-        RecordingError: it is packed, or too large.
-    """
-    if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
-        raise RecordingError(
-            f"{path}: {info.filename} is packed ({info.compress_size} bytes of {info.file_size}); "
-            "torch stores it as it is"
-        )
-    budget.unpack(info.file_size)
-    return archive.read(info)
 
 
 def slipped_by_sequence(folder: Path) -> dict[str, bool]:

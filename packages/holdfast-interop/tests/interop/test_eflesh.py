@@ -15,12 +15,11 @@ N = 20
 VALUES = np.arange(N * 30, dtype="<f4").reshape(N, 30)
 
 
-def write(path, values=VALUES, *, pickle=b"torch\nFloatStorage\n.", packed=False, **members):
+def write(path, values=VALUES, *, pickle=b"torch\nFloatStorage\n.", **members):
     """Write a tensor as torch does, without torch."""
-    kind = zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED
     data = values if isinstance(values, bytes) else values.tobytes()
     content = {"data.pkl": pickle, "byteorder": b"little", "data/0": data, "version": b"3\n"}
-    with zipfile.ZipFile(path, "w", kind) as archive:
+    with zipfile.ZipFile(path, "w") as archive:
         for name, part in (content | members).items():
             if part is not None:
                 archive.writestr(f"{path.stem}/{name}", part)
@@ -114,7 +113,6 @@ def test_a_pickle_that_is_missing_or_none_is_not_needed(tmp_path):
             {"pickle": b"torch\nDoubleStorage\n"},
             "a DoubleStorage given; 2 fingertips x 5 magnetometers x 3 axes of float32 expected",
         ),
-        (VALUES, {"packed": True}, "torch stores it as it is"),
     ],
 )
 def test_tensors_of_another_form(tmp_path, values, members, text):

@@ -173,11 +173,6 @@ def test_only_the_folder_of_a_data_set_is_recognised(data_set):
     assert "has no meta/info.json" in refusal(data_set / "data")
 
 
-def test_a_data_set_that_takes_too_much_memory_is_refused(data_set, monkeypatch):
-    monkeypatch.setenv("HOLDFAST_MAX_BYTES", "100000")
-    assert "set HOLDFAST_MAX_BYTES to read it anyway" in refusal(data_set)
-
-
 @pytest.mark.parametrize("part", ["meta/episodes", "data"])
 def test_a_pipe_in_a_data_set_is_refused_at_once(data_set, part):
     path = data_set / part / "chunk-000/file-000.parquet"

@@ -31,8 +31,8 @@ def doctor(
     """Check the installation and the sources, or the modules of one.
 
     Report Python, the packages, the extras and how to install them, the kernel, the
-    live sources that can be reached, which limits hold for imports (time, time of the processor,
-    memory), the plug-ins of other packages, the configuration file of
+    live sources that can be reached, which limits this system has for imports (time of the
+    processor, memory), the plug-ins of other packages, the configuration file of
     the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
 
     With SOURCE, read ten seconds of the open hand, which nothing touches, and report for each

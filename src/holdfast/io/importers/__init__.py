@@ -14,7 +14,7 @@ from typing import Any
 
 from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
-from holdfast.io.foreign import read_foreign, read_foreign_arrays
+from holdfast.io.foreign import read_foreign, read_foreign_poses
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import SLIPPED, csv_files, name_prefixes
 from holdfast.io.safe_reading import recording_errors
@@ -48,6 +48,7 @@ def import_recordings(
     sensors: Mapping[str, Sensor] | None = None,
     columns: Columns | str | None = None,
     report: Callable[[str], None] = lambda _: None,
+    limited: bool = True,
 ) -> Iterator[Recording]:
     """Import the recordings in a file or folder of another format, one at a time.
 
@@ -61,6 +62,8 @@ def import_recordings(
             guessed from the header. With `sensors` or `columns` the format is one of those that
             take them (`takes_sensors`).
         report: receives a text about columns that were guessed.
+        limited: refuse a file that takes more than 1 GiB of memory, or 120 s of the processor for
+            one recording, to read; False for large files of your own.
 
     Yields:
         Recordings; each is read when the iterator reaches it.
@@ -87,7 +90,7 @@ def import_recordings(
             for part, prefix in parts.items():
                 if not part.is_dir():
                     check_regular(part)
-                for found in read_foreign(part, name, sensors, given, report):
+                for found in read_foreign(part, name, sensors, given, report, limited=limited):
                     recording = replace(found, name=f"{prefix}{found.name}") if prefix else found
                     if labels:
                         yield recording
@@ -147,7 +150,7 @@ def read_poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
     name = _format_of(path, None, None, None)
     if not hasattr(importer(name), "poses"):
         raise RecordingError(f"{path} is of the format {name}, from which no poses can be read")
-    return read_foreign_arrays("poses", path, {"format": name, "bodies": dict(bodies)})
+    return read_foreign_poses(path, name, bodies)
 
 
 def _format_of(

@@ -5,7 +5,6 @@ Nothing is unpickled, and nothing outside of the file is read.
 
 import json
 import re
-import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -24,17 +23,12 @@ from holdfast.io.importers.array_tables import (
 )
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import csv_files, natural_order
-from holdfast.io.safe_reading import JSON_EXPANSION, ReadBudget
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 TAKES_SENSORS = True
 """Whether `read` has the sensors, the columns and the report of `generic_csv.read`."""
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
-MAX_GROUP_DEPTH = 16
-"""Maximum depth of groups inside groups."""
-MAX_ARRAYS = 10_000
-"""Maximum number of arrays of a file."""
 TEXT_SUFFIXES = (".txt", ".log", "")
 HEAD_SIZE = 4096
 """Size of the start of a text in which the first line of JSON must be [bytes]."""
@@ -80,8 +74,6 @@ def read(
         if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
             refuse_pickle(path)
         raise
-    if len(arrays) > MAX_ARRAYS:
-        raise RecordingError(f"{path}: at most {MAX_ARRAYS} arrays expected, {len(arrays)} given")
     return recordings_of_arrays(path, arrays, sensors or {}, columns, report)
 
 
@@ -111,13 +103,7 @@ def arrays_of_npy(path: Path) -> StoredArrays:
 
 
 def arrays_of_npz(path: Path) -> StoredArrays:
-    """Return the arrays of an archive of NumPy.
-
-    Raises:
-        RecordingError: they take too much memory.
-    """
-    with zipfile.ZipFile(path) as file:
-        ReadBudget(path).keep(sum(one.file_size for one in file.infolist()))
+    """Return the arrays of an archive of NumPy."""
     with np.load(path, allow_pickle=False) as content:
         return _flat(dict(content))
 
@@ -144,36 +130,20 @@ def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, Stor
     Args:
         path: path of the file.
         is_transposed: whether axes are in reverse order, as MATLAB writes them.
-
-    Raises:
-        RecordingError: groups are nested too deep, or there are too many arrays.
     """
     require_extras("hdf5")
     import h5py
 
     file = h5py.File(path, "r")  # open until the process has read what it needs
-    budget = ReadBudget(path)
     found: dict[str, StoredArray] = {}
-    seen: set[int] = set()
     waiting: list[tuple[str, Any]] = [("", file["/"])]
     while waiting:
         name, group = waiting.pop()
-        budget.step()
-        address = h5py.h5o.get_info(group.id).addr
-        if address in seen:
-            if isinstance(group, h5py.Dataset):
-                found[name] = _refused(f"{path}: {name} is an array of another group too")
-            continue
-        seen.add(address)
-        if name.count("/") >= MAX_GROUP_DEPTH or len(found) > MAX_ARRAYS:
-            raise RecordingError(
-                f"{path}: at most {MAX_ARRAYS} arrays, nested {MAX_GROUP_DEPTH} deep, expected"
-            )
         for key, value in group.attrs.items():
             if np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf":
                 found[f"{name}/{key}"] = in_memory(np.asarray(value))
         if isinstance(group, h5py.Dataset):
-            found |= _of_dataset(path, name, group, budget, is_transposed=is_transposed)
+            found |= _of_dataset(path, name, group, is_transposed=is_transposed)
             continue
         for key in group:
             inside = f"{name}/{key}".lstrip("/")
@@ -197,7 +167,6 @@ def _of_dataset(
     path: Path,
     name: str,
     dataset: Any,  # noqa: ANN401 (h5py.Dataset)
-    budget: ReadBudget,
     *,
     is_transposed: bool,
 ) -> dict[str, StoredArray]:
@@ -209,8 +178,6 @@ def _of_dataset(
     def values(field: str | None) -> npt.NDArray[Any]:
         if dataset.is_virtual or dataset.external:
             raise RecordingError(f"{path}: {name} {_NOT_STORED}")
-        check_filters(path, name, dataset)
-        budget.keep(dataset.size * dataset.dtype.itemsize)
         array = np.asarray(dataset[() if field is None else field])
         if array.dtype.kind == "O":
             array = np.array([text.decode(errors="replace") for text in array.ravel()])
@@ -231,24 +198,6 @@ def _of_dataset(
     return {name: StoredArray(shape, kind, lambda: values(None))}
 
 
-def check_filters(path: Path, name: str, dataset: Any) -> None:  # noqa: ANN401 (h5py.Dataset)
-    """Check that an array is packed by deflate only; other filters are loaded as plug-ins.
-
-    Raises:
-        RecordingError: it is packed in another way.
-    """
-    from h5py import h5z
-
-    filters = dataset.id.get_create_plist()
-    kinds = [filters.get_filter(k)[0] for k in range(filters.get_nfilters())]
-    known = {h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32}
-    if not known.issuperset(kinds) or len(set(kinds)) < len(kinds):
-        raise RecordingError(
-            f"{path}: {name} is packed by the filters {kinds}; gzip, shuffle and "
-            "fletcher32 expected, each once"
-        )
-
-
 def arrays_of_parquet(path: Path) -> StoredArrays:
     """Return all columns of a Parquet file that `arrays_of_columns` reads."""
     require_extras("parquet")
@@ -265,9 +214,6 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
         path: path of the file.
         file: `pyarrow.parquet.ParquetFile`.
         names: of the columns.
-
-    Raises:
-        RecordingError: they take too much memory.
     """
     import pyarrow as pa
 
@@ -276,21 +222,12 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
             kind = kind.value_type
         return bool(pa.types.is_primitive(kind) or pa.types.is_boolean(kind))
 
-    schema, budget = file.schema_arrow, ReadBudget(path)
+    schema = file.schema_arrow
     wanted = [
         name
         for name in names
         if is_number(schema.field(name).type) or pa.types.is_string(schema.field(name).type)
     ]
-    groups = (file.metadata.row_group(k) for k in range(file.num_row_groups))
-    chunks = (group.column(k) for group in groups for k in range(group.num_columns))
-    budget.keep(
-        sum(
-            chunk.total_uncompressed_size
-            for chunk in chunks
-            if chunk.path_in_schema.split(".")[0] in wanted
-        )
-    )
     found: dict[str, StoredArray] = {}
     table = file.read(columns=wanted, use_threads=False)
     for name in wanted:
@@ -311,7 +248,6 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
 
 def arrays_of_json(path: Path) -> StoredArrays:
     """Return the arrays in lines of JSON, or in one document: a record, or a list of records."""
-    ReadBudget(path).keep(path.stat().st_size * JSON_EXPANSION // 4)
     text = path.read_text(encoding="utf-8-sig")
     try:
         document = json.loads(text)

@@ -19,10 +19,6 @@ from holdfast.sensors.types import Array
 Layout = Mapping[str, Mapping[tuple[int, str], str]]
 """Column by taxel (from 1) and axis, by module; the module is empty without a name."""
 
-MAX_PATTERNS = 1 << 18
-"""Maximum number of patterns that a guess compares; 368 taxels have some thousand."""
-MAX_FEW_AXES = 4096
-"""Maximum number of columns among which taxels of one or two axes are looked for."""
 MAX_GUESSED_NAME = 200
 """Maximum length of the name of a column that a guess considers [characters]."""
 THREE_AXES = "three axes (x, y, z) of each taxel are needed: normal force and shear"
@@ -272,7 +268,7 @@ def _run_layout(text: str, names: Sequence[str], n_taxels: Collection[int]) -> L
 def _few_axes(names: Sequence[str]) -> str | None:
     """Return the pattern of most of the columns if it has taxels of one or two axes only."""
     found: dict[str, set[tuple[int, str]]] = {}
-    for name in names[:MAX_FEW_AXES]:
+    for name in names:
         for pattern, key in _patterns(name):
             found.setdefault(pattern, set()).add(key)
     for pattern, keys in found.items():
@@ -291,17 +287,12 @@ def guessed_taxels(
     Of several with other units, as displacements and forces, it is that of the sensors' unit.
 
     Raises:
-        RecordingError: the names have too many numbers, or several units that no sensor decides.
+        RecordingError: the names have several units that no sensor decides.
     """
     found: dict[str, dict[tuple[int, str], str]] = {}
-    pairs = ((name, *one) for name in names for one in _patterns(name))
-    for n, (name, pattern, key) in enumerate(pairs):
-        if n == MAX_PATTERNS:
-            raise RecordingError(
-                f"the names of {len(names)} columns have too many numbers and axes to guess from: "
-                "give --columns"
-            )
-        found.setdefault(pattern, {})[key] = name
+    for name in names:
+        for pattern, key in _patterns(name):
+            found.setdefault(pattern, {})[key] = name
     sizes: dict[str, int] = {}
     for pattern, columns in found.items():
         n_complete = len(columns) // 3

@@ -6,6 +6,7 @@ import re
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -14,17 +15,12 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular
-from holdfast.io.safe_reading import ReadBudget
 from holdfast.sensors.types import Array
 
 MAX_CELL_LENGTH = 1 << 20
 """Maximum length of a cell [characters]; the csv module itself stops at 131,072."""
-MAX_ROW_SIZE = 1 << 26
-"""Maximum size of a row with long cells [bytes]."""
 MAX_HEAD_SIZE = 1 << 20
 """Maximum size of all lines before the first row [characters]."""
-COLUMN_SIZE = 1 << 13
-"""Size in memory that a column counts besides its values [bytes]."""
 MAX_SHOWN_LENGTH = 80
 """Length from which on names of columns are left out of a message [characters]."""
 SEPARATORS = ",;\t| "
@@ -124,11 +120,10 @@ def read_table(
 
     Raises:
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
-            that is not a number, both decimal commas and points, or a row that is too long.
+            that is not a number, or both decimal commas and points.
     """
     head = head or read_head(path)
     names, first_line, separator = head.names, head.first_line, head.separator
-    ReadBudget(path).keep(len(names) * COLUMN_SIZE)
     cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
     numbers = array("d")
     points = _DecimalPoints(path, separator)
@@ -442,19 +437,10 @@ def _first_lines(file: TextIO) -> Iterator[str]:
 
 
 def _lines(path: Path, head: TableHead) -> Iterator[str]:
-    """Yield the lines of a file from its first row on; blanks between cells as one.
-
-    Raises:
-        csv.Error: a line is too long.
-    """
+    """Yield the lines of a file from its first row on; blanks between cells as one."""
     with path.open(encoding=head.encoding, errors="surrogateescape", newline="") as file:
-        number = 0
-        while line := file.readline(MAX_ROW_SIZE + 1):
-            if len(line) > MAX_ROW_SIZE:
-                raise csv.Error(f"a row of more than {MAX_ROW_SIZE} bytes")
-            number += 1
-            if number >= head.first_line:
-                yield " ".join(line.split()) + "\n" if head.separator == " " else line
+        for line in islice(file, head.first_line - 1, None):
+            yield " ".join(line.split()) + "\n" if head.separator == " " else line
 
 
 def _start(cell: str) -> str:

@@ -1,1 +1,0 @@
-"""Attacks on holdfast, with counts: `python benchmarks/attack.py PART`."""
