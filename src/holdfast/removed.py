@@ -3,16 +3,23 @@
 LAST_COMMIT = "f7d623e5"
 """Commit of version 0.3.0, which still has all of it."""
 
+_WRITTEN_OUT = (
+    "write MODEL, URI and --ignore out, as in holdfast detect builtin:any "
+    '"xela://auto?fingers=1:thumb,2:index" --ignore index:7'
+)
+
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {},
-    "options": {},
-    "sources": {},
+    "options": {"--config": _WRITTEN_OUT},
+    "sources": {"hand": _WRITTEN_OUT},
     "importers": {},
     "exporters": {},
     "hands": {},
+    "files": {"holdfast.toml": _WRITTEN_OUT},
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
-`verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand"."""
+`verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand". `files`
+are those that verbs read in the working folder."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

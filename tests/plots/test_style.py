@@ -46,7 +46,6 @@ axes.grid: True
 savefig.dpi: 30
 savefig.facecolor: blue
 svg.fonttype: none
-text.usetex: True
 xtick.major.size: 20
 """
 

@@ -26,7 +26,7 @@ SCHEMES = {
 """URI schemes of the sources, with a description and an example of each."""
 DEVICE_SCHEMES = ("xela", "serial")
 """Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
-that makes a source, and the names of the parameters of its URI in `PARAMETERS`."""
+that makes a source."""
 VALUES = ("counts", "calibrated")
 """Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
 
@@ -188,8 +188,8 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
 def source_module(scheme: str) -> ModuleType | None:
     """Return the module of the sources of a scheme, None of the twin.
 
-    It may have `PARAMETERS`, names of parameters of the URI, and a function `state()`, which
-    returns in a few words whether such a source can be reached.
+    It may have a function `state()`, which returns in a few words whether such a source can be
+    reached.
 
     Raises:
         ValueError: the plug-in of the scheme cannot be used.
