@@ -7,6 +7,7 @@ _WRITTEN_OUT = (
     "write MODEL, URI and --ignore out, as in holdfast detect builtin:any "
     '"xela://auto?fingers=1:thumb,2:index" --ignore index:7'
 )
+_NONE = "nothing but that commit"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {},
@@ -16,10 +17,19 @@ REMOVED: dict[str, dict[str, str]] = {
     "exporters": {},
     "hands": {},
     "files": {"holdfast.toml": _WRITTEN_OUT},
+    "plugins": {
+        "sensors": "a file of the sensor, as holdfast sensors --template 3x3 > sensor.json makes",
+        "classifiers": "holdfast.features_frame, which gives the features to any classifier",
+        "labels": "CSV, as holdfast label import reads it",
+        "panels": _NONE,
+        "players": _NONE,
+        "laws": _NONE,
+        "groups": _NONE,
+    },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
 `verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand". `files`
-are those that verbs read in the working folder."""
+are those that verbs read in the working folder; `plugins` are kinds of plug-ins."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
-from holdfast.sensors import Sensor, sensor, sensor_names
+from holdfast.sensors import Sensor, built_in_sensors, sensor
 
 if TYPE_CHECKING:
     from holdfast.devices.sources.base import Source
@@ -100,7 +100,7 @@ class Address:
         if given is None:
             return None
         # The names are checked here, so that the message has the URI and all of them.
-        if not given.endswith(".json") and given not in (names := sensor_names()):
+        if not given.endswith(".json") and given not in (names := built_in_sensors()):
             raise ValueError(
                 f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
                 f"expected, {given!r} given"

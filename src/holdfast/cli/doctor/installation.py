@@ -9,6 +9,7 @@ from typing import Any
 from holdfast.cli.extensions import plugin_states
 from holdfast.cli.terminal.console import print_line, print_table
 from holdfast.errors import EXTRA_PURPOSES, install_command, package_versions
+from holdfast.removed import REMOVED
 from holdfast.threads import usable_processors
 
 
@@ -71,6 +72,7 @@ def print_installation(report: dict[str, Any]) -> None:
     plugins = [
         (x["name"], x["kind"], x["package"], f"SKIPPED: {x['error']}" if x["error"] else "works")
         for x in report["plugins"]
+        if x["kind"] not in REMOVED["plugins"]
     ]
     print_table(("holdfast", report["holdfast"]), rows)
     for header, table in (
@@ -82,3 +84,6 @@ def print_installation(report: dict[str, Any]) -> None:
         if table:
             print_line()
             print_table(header, table)
+    for x in report["plugins"]:
+        if x["kind"] in REMOVED["plugins"]:
+            print_line(f"plug-in {x['name']} of {x['package']} is skipped: {x['error']}")
