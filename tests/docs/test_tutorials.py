@@ -33,7 +33,7 @@ def test_your_hand(folder, hand):
             "holdfast label grasps": "holdfast label --port 0 grasps",
         },
     )
-    assert n_run == 9
+    assert n_run == 8
     assert (folder / "my-hand.json").exists()
     assert (folder / "grasps" / "grasp0.labels.json").exists()
 
