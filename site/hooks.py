@@ -39,7 +39,7 @@ COMMAND = re.compile(
     r"^(?:uv run |time |\.venv/bin/)?holdfast +([a-z]+)\b((?: +[^`\n#|;&]*)?)", re.M
 )
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z0-9-]*")
-GLOBAL_OPTIONS = {"--config", "--version", "--help", "--install-completion", "--show-completion"}
+GLOBAL_OPTIONS = {"--version", "--help", "--install-completion", "--show-completion"}
 GRIP_NAMES = [name for name in holdfast_grip.__all__ if name != "LAWS"]
 """Public names of holdfast-grip with a docstring."""
 ASIDE = ("study", "decisions")

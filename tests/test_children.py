@@ -1,7 +1,8 @@
-"""Child processes do not import modules from the working folder, in any command."""
+"""Child processes import no modules from the working folder, and no settings there run code."""
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -9,6 +10,7 @@ from threading import Barrier
 
 import pytest
 
+import ros_messages
 from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
 from holdfast.io import save_recording
 from holdfast.parallel import Engine
@@ -51,6 +53,25 @@ def write(scale):
         file.write(f"{scale}\\n")
 """
 TWIN = "twin:?object=can&seed=1"
+HOSTILE = {
+    "matplotlibrc": "text.usetex: True\nbackend: module://hostile\n",
+    ".dask.yaml": "{{{",
+    "dask.yaml": "distributed: {worker: {preload: [hostile.py]}}\n",
+    ".config/dask/dask.yaml": "distributed: {worker: {preload: [hostile.py]}}\n",
+    ".config/matplotlib/matplotlibrc": "text.usetex: True\n",
+    ".netrc": "machine localhost login a password b\n",
+    ".env": "OMP_NUM_THREADS=x\n",
+    "alembic.ini": "[alembic]\nscript_location = hostile\n",
+    "cyclonedds.xml": "<CycloneDDS",
+    "openssl.cnf": "[",
+    "setup.cfg": "[",
+    "pyproject.toml": "[",
+    "MUJOCO_LOG.TXT/file": "",
+    "hostile.py": "open('ran', 'w').close()\n",
+    "sitecustomize.py": "open('ran', 'w').close()\n",
+    "usercustomize.py": "open('ran', 'w').close()\n",
+}
+"""Content of the files of settings that a dependency reads, or might read, in its folder."""
 
 
 @pytest.fixture(scope="module")
@@ -123,6 +144,41 @@ def test_the_twin_that_simulates_the_next_grasp(run, tmp_path):
         "        pass\n"
     )
     run(TWIN, program=program)
+
+
+def write_bag(path):
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="rosbags is not installed")
+    types = ros_messages.store("xela_server_ros2", ros_messages.XELA, ros2=True)
+    name = "xela_server_ros2/msg/SensStream"
+    plugin = rosbag2.StoragePlugin.MCAP
+    with rosbag2.Writer(path, version=9, storage_plugin=plugin) as writer:
+        topic = writer.add_connection("/xServTopic", name, typestore=types)
+        for k in range(30):
+            sample = (1, "uSPa44", k, k / 100, ros_messages.counts(16, k), [])
+            message = ros_messages.sens_stream(types, "xela_server_ros2", sample)
+            writer.write(topic, k * 10_000_000, types.serialize_cdr(message, name))
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("import", "bag", "imported"),
+        ("simulate", "twin", "--objects", "can", "--cases", "1", "--repeats", "1", "--jobs", "1"),
+        ("info", "grasp0.parquet", "--plot", "grasp.png"),
+        ("detect", "builtin:noise-floor", "grasp0.parquet", "--json"),
+        ("train", ".", "-o", "m.json", "--trials", "2", "--jobs", "2"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_settings_in_the_folder_run_no_code(tmp_path, recordings, words):
+    shutil.copytree(recordings, tmp_path, dirs_exist_ok=True)
+    for name, content in HOSTILE.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(content)
+    if words[0] == "import":
+        write_bag(tmp_path / "bag")
+    subprocess.run([sys.executable, "-P", "-c", COMMAND, *words], cwd=tmp_path, check=True)
+    assert not (tmp_path / "ran").exists()
 
 
 def test_a_child_finds_the_modules_of_its_parent(monkeypatch, tmp_path):

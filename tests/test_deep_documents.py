@@ -2,7 +2,6 @@
 
 import pytest
 
-from holdfast.cli.config import load_config
 from holdfast.errors import ModelError, RecordingError
 from holdfast.io import load_labels
 from holdfast.model import Model
@@ -23,10 +22,9 @@ LINKS = "<link>" * DEPTH + "</link>" * DEPTH
         (load_labels, f'{{"name": {LISTS}}}', RecordingError),
         (Sensor.from_json, f'{{"name": {LISTS}}}', ValueError),
         (load_objects, f"mug = {TOML_LISTS}", ValueError),
-        (load_config, f"hand = {TOML_LISTS}", ValueError),
         (lambda path: Sensor.from_urdf(path, "tip"), f"<robot>{LINKS}</robot>", ValueError),
     ],
-    ids=["model", "labels", "sensor", "objects", "configuration", "URDF"],
+    ids=["model", "labels", "sensor", "objects", "URDF"],
 )
 def test_a_deep_document_is_refused(tmp_path, read, text, refusal):
     path = tmp_path / "deep"

@@ -26,7 +26,7 @@ PLUGIN_FOLDERS = (
     "lab/holdfast_lab/study",
 )
 """Folders of modules that are loaded by name: each may define the constants of their contract."""
-CONTRACT = {"AUTHOR", "EXTRA", "HINT", "PARAMETERS", "SOURCE", "TAKES_SENSORS", "TASK", "TITLE"}
+CONTRACT = {"AUTHOR", "EXTRA", "HINT", "SOURCE", "TAKES_SENSORS", "TASK", "TITLE"}
 """Constants that every module of such a folder may have, as the contract of its kind."""
 TYPE_VARIABLE = "TypeVar("
 """Begin of the value of a type variable, whose name means nothing outside of its function."""

@@ -70,3 +70,14 @@ def test_import_loads_nothing_heavy():
     code = "import sys, holdfast; print(*{'numpy', 'sklearn', 'typer'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+def test_import_changes_nothing_in_the_process():
+    code = (
+        "import os, sys\n"
+        "parts = sys.meta_path, sys.path_hooks, os.environ, vars(os), vars(os.path)\n"
+        "before = [part.copy() for part in parts]\n"
+        "import holdfast\n"
+        "assert [part.copy() for part in parts] == before\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -2,6 +2,7 @@
 
 import functools
 import json
+import re
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -11,26 +12,26 @@ import pytest
 
 import holdfast
 from holdfast import children
-from holdfast.classifiers import recipe, recipe_names
 from holdfast.cli import main
 from holdfast.cli.extensions import (
     EXPORTER_PLUGINS,
     PANEL_PLUGINS,
     PLAYER_PLUGINS,
+    PLUGIN_GROUPS,
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
     flags_of,
     plugin_states,
 )
-from holdfast.devices.uri import open_source, parse
+from holdfast.devices.uri import SOURCE_PLUGINS, open_source, parse
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.foreign import end_children
 from holdfast.io.importers import IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
-from holdfast.sensors import SENSOR_PLUGINS, sensor, sensor_names
+from holdfast.removed import REMOVED
+from holdfast.sensors import sensor
 from holdfast_grip.hands import open_hand
-from holdfast_grip.laws import law_named
 from installed import install, install_project, on_the_path
 
 TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
@@ -38,24 +39,13 @@ TEMPLATE = Path(holdfast.__file__).parents[2] / "examples" / "plugin"
 PARTS = '''
 import os, time
 from pathlib import Path
-from holdfast.classifiers import LogisticRegression
 from holdfast_grip.hands.local import LogFile
-from holdfast_grip.laws import Fixed
-from holdfast.sensors import flat_sensor
-
-same = LogisticRegression(name="same")
 
 pad_name = "pad"
 
 def count(to: int = 1) -> None:
     """Count."""
     print(*range(1, to + 1))
-
-class Twice(Fixed):
-    """Law."""
-
-def pad():
-    return flat_sensor("pad", 1, 2, 1e-3)
 
 class Hand(LogFile):
     def __init__(self, uri):
@@ -80,15 +70,15 @@ def not_a_hand(uri):
     return Path(uri)
 '''
 POINTS = {
-    "holdfast.sensors": {"pad": "parts:pad", "gtac": "parts:pad", "other": "parts:pad"},
-    "holdfast.classifiers": {"same": "parts:same", "none": "parts:pad"},
-    "holdfast.laws": {"twice": "parts:Twice", "wrong": "parts:pad"},
+    "holdfast.sensors": {"pad": "parts:pad_name"},
+    "holdfast.laws": {"twice": "parts:pad_name"},
     "holdfast.hands": {"grab": "parts:Hand", "hollow": "parts:not_a_hand"},
     "holdfast.sources": {
         "gone": "no_such_module:source",
         "number": "parts:__name__",
         "mute": "parts:mute",
         "odd": "parts:odd",
+        "twin": "parts:pad_name",
     },
     "holdfast.importers": {"broken": "broken", "half": "parts"},
     "holdfast.verbs": {"count": "parts:count", "sum": "parts:pad_name"},
@@ -101,7 +91,7 @@ def parts(tmp_path, monkeypatch):
     broken = "import sys\nprint('imported', file=sys.stderr)\nraise RuntimeError('no\\n\x1bdevice')"
     files = {"parts.py": PARTS, "broken.py": broken}
     install(tmp_path / "site", "acme", files, POINTS)
-    for group in (SENSOR_PLUGINS, IMPORTER_PLUGINS):
+    for group in (SOURCE_PLUGINS, IMPORTER_PLUGINS):
         monkeypatch.setattr(group, "_reported", set())
     with on_the_path(tmp_path / "site", monkeypatch):
         yield tmp_path
@@ -112,44 +102,35 @@ def reports(caplog):
 
 
 def test_each_kind_is_found_by_its_name(parts):
-    assert sensor("pad").n_taxels == 2
-    assert recipe("same").name == "same"
-    assert type(law_named("twice")).__name__ == "Twice"
     assert open_hand("grab:left").name == "grab:left"
     assert parse("gone://host")[0] == "gone"
 
 
 def test_names_are_listed_after_our_own(parts, caplog):
-    assert sensor_names()[-2:] == ("other", "pad")
-    assert recipe_names() == ("logreg", "svm", "none", "same")
-    with pytest.raises(ValueError, match=r"there are fixed.*holdfast; of plug-ins: twice, wrong$"):
-        law_named("thrice")
     with pytest.raises(ValueError, match=r"FUNCTION; of plug-ins: grab, hollow, ros1, ros2$"):
         open_hand("grip:left")
+    with pytest.raises(ValueError, match=r"there are xela:, twin:, serial:, gone:, mute:, "):
+        open_source("none:")
     assert reports(caplog) == [
-        "plug-in gtac (sensors of acme 1.2) is skipped: holdfast itself has gtac; another name "
+        "plug-in twin (sources of acme 1.2) is skipped: holdfast itself has twin; another name "
         "expected"
     ]
 
 
 def test_a_plug_in_cannot_replace_our_own(parts):
-    assert sensor("gtac").n_taxels == 15
+    assert open_source("twin:").name == "twin:"
 
 
 def test_nothing_is_imported_before_it_is_used(parts):
-    recipe_names(), sensor_names(), sensor("anyskin"), recipe("svm")
-    with pytest.raises(ValueError, match="unknown sensor"):
-        sensor("none")
+    parse("gone://host"), open_source("twin:")
+    with pytest.raises(ValueError, match="is no hand"):
+        open_hand("none:")
     assert "parts" not in sys.modules
 
 
 @pytest.mark.parametrize(
     ("use", "reason"),
     [
-        (lambda: sensor("other"), "other (sensors of acme 1.2) is skipped: ValueError: a sensor "
-         "with the name other expected, pad given"),
-        (lambda: recipe("none"), "none (classifiers of acme 1.2) is skipped: TypeError: a recipe "),
-        (lambda: law_named("wrong"), "wrong (laws of acme 1.2) is skipped: TypeError: a subclass "),
         (lambda: open_source("gone://h"), "gone (sources of acme 1.2) is skipped: "
          "ModuleNotFoundError: No module named 'no_such_module'"),
         (lambda: open_source("number:"), "number (sources of acme 1.2) is skipped: TypeError: a "
@@ -235,7 +216,7 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
     assert main(["doctor", "--json"]) == 0
     plugins = json.loads(capsys.readouterr().out)["plugins"]
     works = {plugin["name"] for plugin in plugins if not plugin["error"]}
-    assert works == {"pad", "same", "twice", "grab", "hollow", "count"}
+    assert works == {"grab", "hollow", "count"}
     assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
     assert main(["doctor"]) == 0
     out = capsys.readouterr().out
@@ -255,11 +236,32 @@ def test_doctor_lists_them(parts, capsys, monkeypatch):
 def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
         monkeypatch.setattr(children, "CHILD_TIMEOUT", 3.0)
-    points = {"holdfast.laws": {name: f"parts:{name}"}}
+    points = {"holdfast.hands": {name: f"parts:{name}"}}
     install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
     with on_the_path(tmp_path / "more", monkeypatch):
         found = {plugin.name: plugin.error for plugin in plugin_states()}
     assert error in found[name]
+
+
+def test_a_kind_that_was_removed_is_named_with_what_to_use_instead(tmp_path, monkeypatch, capsys):
+    points = {f"holdfast.{kind}": {f"old-{kind}": "none:none"} for kind in REMOVED["plugins"]}
+    install(tmp_path / "site", "acme", {}, points)
+    monkeypatch.setattr(children, "answer_of_child", lambda *_: "")
+    with on_the_path(tmp_path / "site", monkeypatch):
+        with pytest.raises(ValueError, match="unknown sensor"):
+            sensor("old-sensors")
+        assert main(["doctor"]) == 0
+    out = capsys.readouterr().out
+    for kind, instead in REMOVED["plugins"].items():
+        (line,) = [line for line in out.splitlines() if f"old-{kind} of acme 1.2" in line]
+        assert f"the kind {kind} of plug-ins was removed" in line
+        assert line.endswith(instead)
+
+
+def test_without_the_package_of_hands_doctor_lists_none(parts, monkeypatch):
+    monkeypatch.setitem(sys.modules, "holdfast_grip", None)
+    monkeypatch.setattr(children, "answer_of_child", lambda *_: "")
+    assert "hands" not in {plugin.kind for plugin in plugin_states()}
 
 
 def test_help_lists_verbs_of_plug_ins_and_imports_none(parts, capsys):
@@ -338,20 +340,16 @@ def run(tmp_path, monkeypatch, capsys):
 def test_the_template_is_listed_by_doctor(run):
     plugins = json.loads(run("doctor", "--json"))["plugins"]
     assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [
-        ("sensors", "pin-skin", ""), ("sources", "pins", ""), ("importers", "pins-log", ""),
-    ]  # fmt: skip
-
-
-def test_the_sensor_of_the_template(run):
-    listed = json.loads(run("sensors", "--json"))["sensors"]
-    assert listed[-1]["name"] == "pin-skin"
-    assert json.loads(run("sensors", "pin-skin", "--json"))["n_taxels"] == 6
+        ("sources", "pins", ""),
+        ("importers", "pins-log", ""),
+    ]
 
 
 def test_the_source_of_the_template(run, tmp_path):
     run("record", "pins:?seconds=2", "press.mcap")
     recording = holdfast.load_recording(tmp_path / "press.mcap")
     assert recording.modules["finger1"].n_samples == 200
+    assert recording.modules["finger1"].sensor.name == "pin-skin"
     lines = run("detect", "builtin:any", "pins:?seconds=2", "--json").splitlines()
     states = [json.loads(line)["state"] for line in lines]
     assert states[90] == "NO_CONTACT"
@@ -376,5 +374,5 @@ def test_the_format_of_the_template(run, tmp_path):
 
 def test_every_kind_is_described():
     page = (TEMPLATE.parents[1] / "docs" / "plugins.md").read_text("utf-8")
-    for kind in ("sensors", "sources", "importers", "labels", "classifiers", "laws", "hands"):
-        assert f"`holdfast.{kind}`" in page
+    kinds = re.findall(r"^\| `holdfast.(\w+)`", page, re.M)
+    assert sorted(kinds) == sorted(PLUGIN_GROUPS)

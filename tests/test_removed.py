@@ -17,7 +17,7 @@ COMMANDS = {
 
 
 @pytest.mark.parametrize(
-    ("kind", "name"), [(kind, name) for kind, names in REMOVED.items() for name in names]
+    ("kind", "name"), [(kind, name) for kind in COMMANDS for name in REMOVED[kind]]
 )
 def test_what_was_removed_is_one_line_with_what_to_use_instead(
     kind, name, capsys, tmp_path, monkeypatch

@@ -12,8 +12,6 @@ Example:
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from holdfast.folder_settings import ignore_settings_of_folder
-
 if TYPE_CHECKING:
     from holdfast.contact import Cause as Cause
     from holdfast.contact import ContactEstimate as ContactEstimate
@@ -99,9 +97,6 @@ _NAMES = {
 _HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (one list of names, above)
-
-
-ignore_settings_of_folder()  # here, because every process that uses the package comes through here
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (the value is any of the public names)

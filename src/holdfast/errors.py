@@ -58,7 +58,6 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "holdfast-grip": {
         "verbs": ("hold",),
         "panels": ("grip",),
-        "groups": ("hands", "laws"),
         "options": (
             "serve --hand",
             "serve --law",

@@ -1,4 +1,4 @@
-"""Plug-ins of other packages: sensors, sources, importers, classifiers, verbs, exporters, ...
+"""Plug-ins of other packages: verbs, sources, importers, exporters, publishers, ...
 
 A package declares them as entry points (docs/plugins.md). Its code is imported when a name is
 used that holdfast itself does not have, and by `holdfast doctor`. A plug-in that fails is named
@@ -19,14 +19,14 @@ T = TypeVar("T")
 LOGGER_NAME = "holdfast.plugins"
 """Name of the logger that reports plug-ins that are skipped."""
 GROUP_PREFIX = "holdfast."
-"""Begin of the names of all groups of entry points: `holdfast.sensors`."""
+"""Begin of the names of all groups of entry points: `holdfast.sources`."""
 
 
 class Plugin(NamedTuple):
     """A plug-in of an installed package.
 
     Attributes:
-        kind: what it is: `sensors`, `sources`, ...
+        kind: what it is: `verbs`, `sources`, ...
         name: name under which it is used.
         package: name and version of the package.
         error: why it is skipped; empty if it can be used.
@@ -203,14 +203,3 @@ def _reason(cause: BaseException) -> str:
         text = ""
     printable = "".join(character for character in text if character.isprintable())
     return f"{type(cause).__name__}: {printable}" if printable else type(cause).__name__
-
-
-def _group_of_plugin(name: str, loaded: Any) -> PluginGroup[Any]:  # noqa: ANN401
-    """Return the group of a kind that another package has."""
-    if not isinstance(loaded, PluginGroup) or loaded.kind != name:
-        raise TypeError(f"a PluginGroup of {name} expected, {loaded!r} given")
-    return loaded
-
-
-GROUP_PLUGINS = PluginGroup("groups", (), _group_of_plugin)
-"""Kinds of plug-ins of other packages, such as hands: so that `holdfast doctor` lists them."""

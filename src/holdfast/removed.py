@@ -6,6 +6,11 @@ LAST_COMMIT = "f7d623e5"
 AUDIT = "holdfast evaluate MODEL RECORDINGS --plot FILE shows where labels and model differ most"
 COMPARE = "holdfast label export csv FOLDER RECORDINGS, once for each set of labels"
 LABELS_AS_CSV = "labels as CSV, by holdfast label export csv and holdfast label import FILE"
+WRITTEN_OUT = (
+    "write MODEL, URI and --ignore out, as in holdfast detect builtin:any "
+    '"xela://auto?fingers=1:thumb,2:index" --ignore index:7'
+)
+NONE = "nothing but that commit"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {
@@ -32,8 +37,11 @@ REMOVED: dict[str, dict[str, str]] = {
         "label import --annotator": LABELS_AS_CSV,
         "train --objective": "none; the search of an SVM minimises errors, any other the log loss",
         "datasets --yes": "leave it out, no set is larger than 26 MB",
+        "--config": WRITTEN_OUT,
     },
-    "sources": {},
+    "sources": {
+        "hand": WRITTEN_OUT,
+    },
     "importers": {
         "anyskin-slip": "holdfast import FILE OUT --sensor anyskin (without labels)",
         "arq-crisp": "holdfast import FILE OUT --array tactile_data_raw=SENSOR (without labels)",
@@ -49,6 +57,18 @@ REMOVED: dict[str, dict[str, str]] = {
     "rules": {
         "onnx": "train a model with holdfast train, or apply a classifier of your own to what "
         "holdfast.features_frame returns",
+    },
+    "files": {
+        "holdfast.toml": WRITTEN_OUT,
+    },
+    "plugins": {
+        "sensors": "a file of the sensor, as holdfast sensors --template 3x3 > sensor.json makes",
+        "classifiers": "holdfast.features_frame, which gives the features to any classifier",
+        "labels": "CSV, as holdfast label import reads it",
+        "panels": NONE,
+        "players": NONE,
+        "laws": NONE,
+        "groups": NONE,
     },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:

@@ -7,6 +7,7 @@ import pytest
 
 from holdfast.cli import app, main
 from holdfast.errors import RecordingError
+from holdfast.removed import REMOVED
 
 
 def run(*words, **options):
@@ -186,3 +187,34 @@ def test_exit_code_reaches_the_shell():
     assert done.returncode == 2
     assert done.stdout == ""
     assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("verb", ["detect", "serve", "record", "calibrate", "hold"])
+@pytest.mark.parametrize("words", [(), ("builtin:noise-floor", "none.mcap")])
+def test_settings_that_still_lie_here_are_named_once(verb, words, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    without = main([verb, *words]), *capsys.readouterr()
+    (tmp_path / "holdfast.toml").write_text('model = "builtin:any"\nignore = {thumb = [1]}\n')
+    code, out, err = main([verb, *words]), *capsys.readouterr()
+    notice, _, rest = err.partition("\n")
+    assert (code, out, rest) == without
+    assert "holdfast.toml" in notice
+    assert notice.endswith(REMOVED["files"]["holdfast.toml"])
+
+
+def test_verbs_that_did_not_read_the_settings_do_not_name_them(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "holdfast.toml").write_text("[")
+    for verb in ("sensors", "study"):
+        main([verb, "--json"])
+        assert "holdfast.toml" not in capsys.readouterr().err
+
+
+def test_the_removed_source_hand_is_no_path(capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for words in (("detect", "builtin:any"), ("calibrate", "-o", "a.json", "builtin:any")):
+        assert main([*words, "hand"]) == 2
+        assert "the source hand was removed" in one_line(capsys)
+    (tmp_path / "hand").mkdir()
+    assert main(["detect", "builtin:any", "hand"]) == 2
+    assert "removed" not in one_line(capsys)

@@ -209,7 +209,7 @@ def test_bad_handling_is_one_line(capsys, folder, tmp_path, kind):
         (("model.json", "data", "--seconds", "9"), "--seconds and --speed are for live sources"),
         (("model.json", "xela://auto", "--seconds", "0"), "--seconds: more than 0 s expected"),
         (("model.json", "data", "--false-alarms", "-1"), "of at least 0 expected, -1 given"),
-        (("model.json", "hand"), "hand is the source of a configuration file"),
+        (("model.json", "hand"), "the source hand was removed"),
     ],
 )
 def test_bad_input_is_one_line(capsys, folder, tmp_path, monkeypatch, words, message):

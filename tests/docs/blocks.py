@@ -4,7 +4,6 @@ A comment directly above a block says what is special about it:
 
     <!-- not run: REASON -->   its `holdfast` commands are only checked for their options
     <!-- until Ctrl-C -->      the command runs until it is interrupted
-    <!-- file: NAME -->        the block is the content of a file
     <!-- live -->              the Python program runs until its source ends
 
 Blocks of `sh` and `python` run, others (`json`, `text`, ...) do not. A `holdfast` command without
@@ -28,7 +27,6 @@ from typing import NamedTuple
 from typer.main import get_command
 
 from holdfast.cli import app, main
-from holdfast.cli.config import Config
 
 ROOT = Path(__file__).parents[2]
 BIN = Path(sys.executable).parent
@@ -135,13 +133,11 @@ def plain(line: str) -> str:
 
 def run_block(block: Block, names: dict[str, object]) -> bool:
     """Run a block; return whether it ran."""
-    kind, _, rest = block.note.partition(": ")
+    kind = block.note.partition(": ")[0]
     if kind == "not run":
         check_options(block)
         return False
-    if kind == "file":
-        Path(rest).write_text(block.text, "utf-8")
-    elif block.language == "sh":
+    if block.language == "sh":
         for line in lines_of(block.text):
             run_line(line, block, endless=kind == "until Ctrl-C")
     elif block.language == "python" and ">>>" not in block.text:
@@ -216,6 +212,5 @@ def check_options(block: Block) -> None:
             if words and Path(words[0]).name == "holdfast":
                 command = get_command(app._app(words[1:]))
                 with command.make_context("holdfast", words[1:]) as context:
-                    context.obj = Config()
                     name, verb, rest = command.resolve_command(context, words[1:])
                     verb.make_context(name, rest, parent=context)

@@ -18,7 +18,7 @@ FINGERS = ("thumb", "index", "middle", "ring")
 def folder(tmp_path, monkeypatch):
     """An empty working folder, with the settings of no user."""
     monkeypatch.chdir(tmp_path)
-    for name in ("HOLDFAST_CONFIG", "DISPLAY", "WAYLAND_DISPLAY"):
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(name, raising=False)
     return tmp_path
 

@@ -40,11 +40,10 @@ def test_an_error_of_python_has_the_line_of_the_page(folder):
     assert raised.traceback[-1].lineno + 1 == 4
 
 
-def test_a_file_and_a_command(folder):
-    page = write(
-        folder, "<!-- file: a.txt -->\n```toml\nx\n```\n```sh\ncp a.txt \\\n  b.txt  # copy\n```\n"
-    )
-    assert blocks.run_page(page) == 2
+def test_a_command(folder):
+    (folder / "a.txt").write_text("x\n")
+    page = write(folder, "```sh\ncp a.txt \\\n  b.txt  # copy\n```\n")
+    assert blocks.run_page(page) == 1
     assert (folder / "b.txt").read_text() == "x\n"
 
 

@@ -27,13 +27,13 @@ def test_your_hand(folder, hand):
     n_run = blocks.run_page(
         DOCS / "tutorials" / "your-hand.md",
         {
-            'host = "auto"': f'host = "{host}"',
+            "xela://auto": f"xela://{host}",
             "holdfast serve": "holdfast serve --port 0",
             "holdfast play": "holdfast play --port 0",
             "holdfast label grasps": "holdfast label --port 0 grasps",
         },
     )
-    assert n_run == 9
+    assert n_run == 8
     assert (folder / "my-hand.json").exists()
     assert (folder / "grasps" / "grasp0.labels.json").exists()
 

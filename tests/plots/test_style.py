@@ -1,7 +1,11 @@
 import subprocess
 import sys
 
+import pytest
+
+from holdfast.io import save_recording
 from holdfast.plots.style import PAPER, page_figure, series_styles
+from holdfast.synthetic import synthetic_recording
 
 
 def test_eighteen_styles_are_different():
@@ -18,6 +22,45 @@ def test_pyplot_is_not_imported():
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", program], check=True)
+
+
+DRAWINGS = {
+    "a verb": "from holdfast.cli import main; main(['info', 'grasp.parquet', '--plot', 'it.png'])",
+    "sensors": "from holdfast.cli import main; main(['sensors', 'gtac', '--plot', 'it.png'])",
+    "pyplot": """
+from holdfast import Model, detect, load_recording
+from holdfast.plots.detection import plot_detection
+found = detect(Model.load("builtin:noise-floor"), load_recording("grasp.parquet"))
+plot_detection(found)[0].figure.savefig("it.png")
+""",
+    "laboratory": """
+from pathlib import Path
+from holdfast_lab.figures.curves import draw_reliability
+from holdfast_lab.report.html_report import svg_of
+Path("it.png").write_text(svg_of(draw_reliability({}), "it"))
+""",
+}
+SETTINGS = """
+axes.facecolor: red
+axes.grid: True
+savefig.dpi: 30
+savefig.facecolor: blue
+svg.fonttype: none
+xtick.major.size: 20
+"""
+
+
+@pytest.mark.parametrize("drawing", DRAWINGS)
+def test_settings_of_the_folder_do_not_change_a_figure(tmp_path, drawing):
+    figures = []
+    for name, settings in (("plain", ""), ("own", SETTINGS)):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "matplotlibrc").write_text(settings)
+        save_recording(synthetic_recording("grasp", 1), folder / "grasp.parquet")
+        subprocess.run([sys.executable, "-c", DRAWINGS[drawing]], cwd=folder, check=True)
+        figures.append((folder / "it.png").read_bytes())
+    assert figures[0] == figures[1]
 
 
 def test_a_notebook_shows_a_figure_as_a_picture_that_is_always_the_same():

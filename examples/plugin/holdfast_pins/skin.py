@@ -10,5 +10,5 @@ RATE = 100.0
 
 
 def pin_skin() -> Sensor:
-    """Return the sensor; its name is that of the entry point."""
+    """Return the sensor."""
     return flat_sensor("pin-skin", N_ROWS, N_COLUMNS, PITCH, rate=RATE)

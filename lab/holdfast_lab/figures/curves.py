@@ -16,6 +16,7 @@ from holdfast.plots.style import (
     SeriesStyle,
     add_labels,
     add_legend,
+    default_settings,
     legend_handles,
     literal,
     page_figure,
@@ -47,6 +48,7 @@ class PlottedCurve(NamedTuple):
     chosen: int | None = None
 
 
+@default_settings()
 def draw_lines(
     groups: Mapping[str, Mapping[str, PlottedCurve]], x: str, *, log: bool = False, per_row: int = 3
 ) -> Figure:
@@ -80,6 +82,7 @@ def draw_lines(
     return figure
 
 
+@default_settings()
 def draw_alarms(
     groups: Mapping[str, Mapping[str, PlottedCurve]],
     x: str = "false alarms per minute of stable label",
@@ -124,6 +127,7 @@ def draw_alarms(
     return figure
 
 
+@default_settings()
 def draw_reliability(curves: Mapping[str, Array], notes: Mapping[str, str] | None = None) -> Figure:
     """Draw the fraction labelled stable over the probability; below, the number of samples.
 

@@ -17,6 +17,7 @@ from holdfast.plots.style import (
     SeriesStyle,
     add_labels,
     add_legend,
+    default_settings,
     legend_handles,
     literal,
     page_figure,
@@ -36,6 +37,7 @@ class IntervalEstimate(NamedTuple):
     paper: float | None = None
 
 
+@default_settings()
 def draw_dots(
     groups: Mapping[str, Mapping[str, IntervalEstimate]], strong: Collection[str] = ()
 ) -> Figure:
@@ -74,6 +76,7 @@ def draw_dots(
     return figure
 
 
+@default_settings()
 def draw_groups(
     groups: Mapping[str, Mapping[str, Mapping[str, IntervalEstimate]]], y: str, per_row: int = 2
 ) -> Figure:

@@ -16,6 +16,7 @@ from holdfast.plots.style import (
     STATE_COLOURS,
     add_labels,
     add_legend,
+    default_settings,
     literal,
     page_figure,
     style_axes,
@@ -42,6 +43,7 @@ PROBABILITY_COLOURS = ("#0072b2", "#d55e00")
 """Colours of P(stable) of the first and the second method."""
 
 
+@default_settings()
 def draw_forces(series: FingerSeries) -> Figure:
     """Draw the components of the fingertip force, with the phases shaded and named.
 
@@ -57,6 +59,7 @@ def draw_forces(series: FingerSeries) -> Figure:
     return figure
 
 
+@default_settings()
 def draw_features(series: FingerSeries) -> Figure:
     """Draw force, amplitude, mean, sigma and the label of one experiment.
 
@@ -79,6 +82,7 @@ def draw_features(series: FingerSeries) -> Figure:
     return figure
 
 
+@default_settings()
 def draw_experiment(
     series: FingerSeries,
     predicted: Mapping[str, StateCodes],

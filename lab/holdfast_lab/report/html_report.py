@@ -13,6 +13,7 @@ from typing import NamedTuple, Self
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from holdfast.plots.style import default_settings
 from holdfast_lab.report.rendering import render
 from holdfast_lab.report.result_tables import FILE_NAME, ResultTable
 from holdfast_lab.report.table_layouts import TableText, table_text
@@ -41,8 +42,9 @@ def svg_of(figure: Figure, name: str) -> str:
     # Letters as paths look alike without the font. With a fixed salt and no date, the same study
     # gives the same file.
     file = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
-        figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    # `savefig` of our figures has the default salt, which is random.
+    with default_settings(), mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
+        figure.canvas.print_figure(file, format="svg", metadata={"Date": None, "Creator": None})
     return file.getvalue()
 
 

@@ -18,6 +18,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     add_title,
+    default_settings,
     legend_handles,
     panels,
     series_styles,
@@ -47,6 +48,7 @@ class Distribution(NamedTuple):
     goal: float | None = None
 
 
+@default_settings()
 def draw_distributions(groups: Mapping[str, Distribution]) -> Figure:
     """Draw which share of all values is at most x, as steps over a logarithmic x.
 
@@ -89,6 +91,7 @@ class TradeOff(NamedTuple):
     y: IntervalEstimate
 
 
+@default_settings()
 def draw_trade_offs(
     groups: Mapping[str, Mapping[str, TradeOff]], x: str, y: str, goal: tuple[float, float]
 ) -> Figure:
@@ -129,6 +132,7 @@ def draw_trade_offs(
     return figure
 
 
+@default_settings()
 def draw_courses(courses: Mapping[str, TrialCourse]) -> Figure:
     """Draw force and slip speed over time, one column for each series.
 

@@ -17,7 +17,7 @@ from holdfast.cli.options import (
     SpeedOption,
     StartOptions,
     check_seconds,
-    complete_source,
+    check_source,
 )
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.control import handle_stop_signals
@@ -36,9 +36,9 @@ def hold(
     source: Annotated[
         str | None,
         typer.Argument(
-            help="Path of a recording, URI of a source (see above), or hand (of holdfast.toml). "
+            help="Path of a recording, or URI of a source (see above). "
             "Without MODEL: twin:..., which builtin:twin was trained on.",
-            callback=complete_source,
+            callback=check_source,
         ),
     ] = None,
     *,

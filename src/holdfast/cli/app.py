@@ -21,8 +21,8 @@ from typer.core import TyperCommand, TyperGroup
 from typer.main import get_command
 
 from holdfast.cli.extensions import PluginOptions
-from holdfast.cli.options import RARE, SourceArgument
-from holdfast.cli.terminal.console import break_silence, print_error, print_line
+from holdfast.cli.options import RARE
+from holdfast.cli.terminal.console import break_silence, print_error, print_line, print_message
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
 from holdfast.plugins import PluginGroup
 from holdfast.removed import removal
@@ -79,8 +79,9 @@ EPILOG = (
     "doctor finds it, and holdfast serve builtin:any xela://auto shows it. The tutorials and all "
     "pages: docs/ of the repository."
 )
-CONFIGURED_VERBS = ("detect", "serve", "record", "calibrate")
-"""Verbs that read the configuration file of `cli/config.py`; see `_is_configured`."""
+SETTINGS_FILE, SETTINGS_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
+SETTINGS_VERBS = ("detect", "serve", "record", "calibrate")
+"""Verbs that read this file in 0.3.0, as did those of other packages with a source."""
 COMPLETE_VARIABLE = "_HOLDFAST_COMPLETE"
 """Is set by the completion script of a shell."""
 
@@ -167,7 +168,7 @@ def _app(words: list[str]) -> typer.Typer:
             # The help needs the name and one line; importing all verbs would make it slow.
             app.command(name, help=summary)(_placeholder)
     for name in SUB_VERBS:
-        # A subset: options of holdfast itself, as --config, may stand before the words.
+        # A subset: the line that a shell completes begins with `holdfast`.
         if set(name.split()) <= set(words):
             _add(app, name, hidden=True)
     return app
@@ -382,40 +383,23 @@ def _maker_of(group: type) -> Callable[[Values], object]:
 
 def _root(
     context: typer.Context,
-    config: Annotated[
-        Path | None,
-        typer.Option(
-            help="Configuration file of your hand.",
-            show_default="HOLDFAST_CONFIG, or holdfast.toml in this folder",
-        ),
-    ] = None,
     version: Annotated[
         bool,
         typer.Option("--version", help="Print the version.", callback=_version, is_eager=True),
     ] = False,
 ) -> None:
-    """Read the configuration file, for the verbs that use it."""
-    verb = context.invoked_subcommand or ""
-    # A file that is named by --config is checked, even if the verb does not use it.
-    if _is_configured(verb) or config is not None:
-        from holdfast.cli.config import find_config, load_config
-
-        path = find_config(config)
-        if path is not None:
-            context.obj = load_config(path)
-            # Defaults only: what is typed wins.
-            context.default_map = {verb: context.obj.defaults()} if _is_configured(verb) else {}
+    """Print that the settings of the hand are not read any more, if there are any."""
+    has_settings = Path(SETTINGS_FILE).is_file() or SETTINGS_VARIABLE in os.environ
+    if has_settings and _read_settings(context.invoked_subcommand or ""):
+        what = f"the use of {SETTINGS_FILE} and {SETTINGS_VARIABLE}"
+        print_message(removal("files", SETTINGS_FILE, what))
 
 
-def _is_configured(verb: str) -> bool:
-    """Return whether a verb has its defaults from the configuration file of `cli/config.py`.
-
-    A verb of a plug-in has them if it takes a `SourceArgument`.
-    """
-    if verb in VERBS and verb in OWN_VERBS:
-        return verb in CONFIGURED_VERBS
-    parameters = inspect.signature(load_verb(verb), eval_str=True).parameters.values()
-    return any(parameter.annotation == SourceArgument for parameter in parameters)
+def _read_settings(verb: str) -> bool:
+    """Return whether a verb had its defaults from the settings of the hand."""
+    if verb in (*OWN_VERBS, *SUB_VERBS):
+        return verb in SETTINGS_VERBS
+    return "source" in inspect.signature(load_verb(verb)).parameters
 
 
 def _placeholder() -> None:
@@ -438,7 +422,8 @@ def _report(failure: BaseException) -> int:
             context, option = getattr(failure, "ctx", None), getattr(failure, "option_name", "")
             verb = getattr(context, "info_name", "")
             # The option of a package that is not installed is unknown to click.
-            missing = missing_part("options", f"{verb} {option}", f"the option {option}")
+            name = f"{verb} {option}".removeprefix("holdfast ")
+            missing = missing_part("options", name, f"the option {option}")
             text = failure.format_message().rstrip(".")  # type: ignore[attr-defined]
             path = getattr(context, "command_path", "holdfast")
             print_error(str(missing) if missing else f"{text} (see {path} --help)")

@@ -13,8 +13,8 @@ from holdfast.cli.options import (
     SpeedOption,
     StartOptions,
     check_seconds,
+    check_source,
     check_speed,
-    complete_source,
 )
 from holdfast.cli.terminal.console import (
     print_json,
@@ -35,8 +35,7 @@ def calibrate(
     data: Annotated[
         str,
         typer.Argument(
-            help="A recording, a folder of them, URI of a source, or hand (of holdfast.toml).",
-            callback=complete_source,
+            help="A recording, a folder of them, or URI of a source.", callback=check_source
         ),
     ],
     out: ModelOutput,

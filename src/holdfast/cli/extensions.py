@@ -12,7 +12,9 @@ from importlib import import_module
 from typing import Any, ClassVar
 
 from holdfast import children
-from holdfast.plugins import GROUP_PLUGINS, Plugin, PluginGroup
+from holdfast.errors import is_installed
+from holdfast.plugins import Plugin, PluginGroup
+from holdfast.removed import REMOVED, removal
 
 
 class PluginOptions:
@@ -108,29 +110,36 @@ class SimulatorOptions(PluginOptions):
 
 
 PLUGIN_GROUPS = {
-    "sensors": ("sensors", "SENSOR_PLUGINS"),
-    "sources": ("devices.uri", "SOURCE_PLUGINS"),
-    "importers": ("io.importers", "IMPORTER_PLUGINS"),
-    "classifiers": ("classifiers", "CLASSIFIER_PLUGINS"),
-    "verbs": ("cli.app", "VERB_PLUGINS"),
-    "exporters": ("cli.extensions", "EXPORTER_PLUGINS"),
-    "publishers": ("cli.extensions", "PUBLISHER_PLUGINS"),
-    "panels": ("cli.extensions", "PANEL_PLUGINS"),
-    "players": ("cli.extensions", "PLAYER_PLUGINS"),
-    "simulators": ("cli.extensions", "SIMULATOR_PLUGINS"),
+    "verbs": ("holdfast.cli.app", "VERB_PLUGINS"),
+    "sources": ("holdfast.devices.uri", "SOURCE_PLUGINS"),
+    "importers": ("holdfast.io.importers", "IMPORTER_PLUGINS"),
+    "exporters": ("holdfast.cli.extensions", "EXPORTER_PLUGINS"),
+    "publishers": ("holdfast.cli.extensions", "PUBLISHER_PLUGINS"),
+    "simulators": ("holdfast.cli.extensions", "SIMULATOR_PLUGINS"),
+    "hands": ("holdfast_grip.hands", "HAND_PLUGINS"),
 }
-"""Module and name of each group of plug-ins, by kind; a child imports one of them. Packages may
-have kinds of their own, see `GROUP_PLUGINS`."""
+"""Module and name of each group of plug-ins, by kind; a child imports one of them. Hands need
+holdfast-grip."""
 
 
 def plugin_states() -> list[Plugin]:
     """Return the plug-ins of other packages, and why some of them are skipped.
 
-    Each is imported in a child process, which it may end or block.
+    Each is imported in a child process, which it may end or block; those of a kind that was
+    removed are not.
     """
-    kinds = (*PLUGIN_GROUPS, *GROUP_PLUGINS.load_all())
     error = partial(children.answer_of_child, __name__, "plugin_error")
-    return [plugin for kind in kinds for plugin in _plugin_group(kind).states(error)]
+    states = [
+        plugin
+        for kind, (module, _) in PLUGIN_GROUPS.items()
+        if is_installed(module.partition(".")[0])
+        for plugin in _plugin_group(kind).states(error)
+    ]
+    for kind in REMOVED["plugins"]:
+        reason = removal("plugins", kind, f"the kind {kind} of plug-ins")
+        group = PluginGroup(kind, (), lambda _, loaded: loaded)
+        states += group.states(lambda *_, reason=reason: reason)
+    return states
 
 
 def plugin_error(kind: str, name: str) -> str:
@@ -139,8 +148,6 @@ def plugin_error(kind: str, name: str) -> str:
 
 
 def _plugin_group(kind: str) -> PluginGroup[Any]:
-    if kind not in PLUGIN_GROUPS:
-        return GROUP_PLUGINS.require(kind, f"the kind {kind} of plug-ins")
     module, name = PLUGIN_GROUPS[kind]
-    group: PluginGroup[Any] = getattr(import_module(f"holdfast.{module}"), name)
+    group: PluginGroup[Any] = getattr(import_module(module), name)
     return group

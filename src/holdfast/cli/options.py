@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.terminal.console import print_message
-from holdfast.errors import require_extras
+from holdfast.errors import HoldfastError, require_extras
+from holdfast.removed import removal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,30 +52,22 @@ ModelArgument = Annotated[
 ]
 
 
-def complete_source(context: typer.Context, source: str | None) -> str | None:
-    """Return a source with the parameters of the configuration file that it does not have.
-
-    None, of a verb whose source may be left out, stays None.
+def check_source(source: str | None) -> str | None:
+    """Return a source, if it is none that was removed, such as `hand`.
 
     Raises:
-        ValueError: the source is `hand`, and there is no configuration file.
+        HoldfastError: it was removed, and no file has this name.
     """
-    if source is not None and context.obj is not None:
-        completed: str = context.obj.complete(source)
-        return completed
-    if source == "hand" and not Path(source).exists():
-        raise ValueError(
-            "hand is the source of a configuration file; there is no holdfast.toml in this "
-            "folder (or name one with holdfast --config FILE)"
-        )
+    text = removal("sources", source or "", f"the source {source}")
+    if text and not Path(source or "").exists():
+        raise HoldfastError(text)
     return source
 
 
 SourceArgument = Annotated[
     str,
     typer.Argument(
-        help="Path of a recording, URI of a source (see above), or hand (of holdfast.toml).",
-        callback=complete_source,
+        help="Path of a recording, or URI of a source (see above).", callback=check_source
     ),
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON on stdout.")]
@@ -443,7 +436,6 @@ def parse_taxels(text: str, sensors: Mapping[str, "Sensor"]) -> dict[str, tuple[
         finger, _, number = part.strip().rpartition(":")
         if not (finger and number.isdecimal()):
             raise ValueError(f"--ignore: FINGER:TAXEL,... expected, {text!r} given")
-        # A configuration file names taxels of all fingers; a source may have only some of them.
         if finger in sensors:
             first, last = taxel_number(0), taxel_number(sensors[finger].n_taxels - 1)
             if not first <= int(number) <= last:

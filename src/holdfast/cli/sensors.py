@@ -95,7 +95,6 @@ def print_all(*, as_json: bool) -> None:
     from holdfast import sensors as known
 
     skins = [known.sensor(name) for name in known.built_in_sensors()]
-    skins += known.SENSOR_PLUGINS.load_all().values()
     hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")

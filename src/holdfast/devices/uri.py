@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
-from holdfast.sensors import Sensor, sensor, sensor_names
+from holdfast.sensors import Sensor, built_in_sensors, sensor
 
 if TYPE_CHECKING:
     from holdfast.devices.sources.base import Source
@@ -26,7 +26,7 @@ SCHEMES = {
 """URI schemes of the sources, with a description and an example of each."""
 DEVICE_SCHEMES = ("xela", "serial")
 """Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
-that makes a source, and the names of the parameters of its URI in `PARAMETERS`."""
+that makes a source."""
 VALUES = ("counts", "calibrated")
 """Readings to take from a packet: uint16 counts, or newtons if the device sends them."""
 
@@ -100,7 +100,7 @@ class Address:
         if given is None:
             return None
         # The names are checked here, so that the message has the URI and all of them.
-        if not given.endswith(".json") and given not in (names := sensor_names()):
+        if not given.endswith(".json") and given not in (names := built_in_sensors()):
             raise ValueError(
                 f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
                 f"expected, {given!r} given"
@@ -188,8 +188,8 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
 def source_module(scheme: str) -> ModuleType | None:
     """Return the module of the sources of a scheme, None of the twin.
 
-    It may have `PARAMETERS`, names of parameters of the URI, and a function `state()`, which
-    returns in a few words whether such a source can be reached.
+    It may have a function `state()`, which returns in a few words whether such a source can be
+    reached.
 
     Raises:
         ValueError: the plug-in of the scheme cannot be used.

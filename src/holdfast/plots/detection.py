@@ -13,8 +13,10 @@ from holdfast.plots.style import (
     FONT_SIZE,
     PAGE_WIDTH,
     STATE_COLOURS,
+    PageFigure,
     add_labels,
     add_title,
+    default_settings,
     style_axes,
 )
 from holdfast.plots.time_series import draw_line, equal_spans
@@ -26,6 +28,7 @@ STATE_ALPHA = 0.35
 STATES = tuple(ContactState)
 
 
+@default_settings()
 def plot_detection(detection: Detection, axes: Sequence[Axes] | None = None) -> list[Axes]:
     """Draw |F_tip| of each finger over time, on the colours of its states; UNKNOWN has none.
 
@@ -44,8 +47,8 @@ def plot_detection(detection: Detection, axes: Sequence[Axes] | None = None) -> 
 
         n = len(detection.fingers)
         size = PAGE_WIDTH, n * FINGER_HEIGHT + 0.4
-        _, grid = plt.subplots(n, sharex=True, squeeze=False, figsize=size, layout="constrained")
-        axes = list(grid[:, 0])
+        figure = plt.figure(figsize=size, layout="constrained", FigureClass=PageFigure)
+        axes = list(figure.subplots(n, sharex=True, squeeze=False)[:, 0])
     if len(axes) != len(detection.fingers):
         raise ValueError(
             f"one axes for each of {len(detection.fingers)} fingers expected, {len(axes)} given"

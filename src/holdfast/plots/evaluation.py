@@ -25,6 +25,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     add_title,
+    default_settings,
     literal,
     page_figure,
     series_styles,
@@ -44,6 +45,7 @@ MAX_DELAY = 0.5
 """End of the time axis of the delays [s]."""
 
 
+@default_settings()
 def draw_evaluation(metrics: Metrics, decisions: Sequence[Decisions]) -> Figure:
     """Draw accuracy and AUC of each recording, calibration, delays of alarms, and slips.
 

@@ -25,6 +25,7 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     add_title,
+    default_settings,
     literal,
     page_figure,
     style_axes,
@@ -48,6 +49,7 @@ MARKER_LETTER_WIDTH = 0.011
 """Width of a letter of a marker, as a fraction of the width of the axes."""
 
 
+@default_settings()
 def plot_recording(
     recording: Recording,
     tare: Tare | None = None,

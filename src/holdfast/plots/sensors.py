@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 from mpl_toolkits.mplot3d import Axes3D  # type: ignore[import-untyped]
 
-from holdfast.plots.style import PageFigure, literal
+from holdfast.plots.style import PageFigure, default_settings, literal
 from holdfast.sensors import Hand, Sensor, taxel_number
 from holdfast.sensors.types import Array
 
@@ -29,6 +29,7 @@ PART_COLOURS = {
 }
 
 
+@default_settings()
 def plot_sensor(sensor: Sensor) -> Figure:
     """Draw the taxels of a sensor in space with their normals, and numbered from outside."""
     figure = PageFigure(figsize=(8.2, 4.2), dpi=160, layout="constrained")
@@ -57,6 +58,7 @@ def plot_sensor(sensor: Sensor) -> Figure:
     return figure
 
 
+@default_settings()
 def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
     """Draw the noise of each taxel and axis, (n_taxels, 3) by module, one panel a module."""
     figure = PageFigure(figsize=(7.2, 0.4 + 1.4 * len(noise)), dpi=160, layout="constrained")
@@ -76,6 +78,7 @@ def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
     return figure
 
 
+@default_settings()
 def plot_hand(hand: Hand) -> Figure:
     """Draw the flat map of a hand: every taxel with its number, coloured by finger."""
     cells = np.concatenate([module.grid for module in hand.modules.values()])

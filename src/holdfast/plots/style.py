@@ -1,9 +1,11 @@
 """Style that all figures share: sizes, colours, axes and legends. No screen is needed."""
 
 import io
-from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Literal, NamedTuple
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any, Literal, NamedTuple
 
+import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -65,8 +67,24 @@ def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
     return styles | {PAPER: SeriesStyle("black", "x", (0, (4, 2)))}
 
 
+@contextmanager
+def default_settings() -> Iterator[None]:
+    """Draw with matplotlib's defaults, whatever a `matplotlibrc` of the working folder has.
+
+    Every function that draws or saves a figure has it as its decorator.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        yield
+
+
 class PageFigure(Figure):
     """Figure that a notebook shows as a picture, without pyplot, which would keep it."""
+
+    @default_settings()
+    def savefig(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401 (of matplotlib)
+        """Save the figure, as matplotlib does; ticks are made only now."""
+        super().savefig(*args, **kwargs)
 
     def _repr_png_(self) -> bytes:
         """Return the figure as a PNG file; a notebook calls it."""

@@ -1,14 +1,12 @@
-"""Built-in sensors and hands, made from the tables in the folder `tables`; those of plug-ins."""
+"""Built-in sensors and hands, made from the tables in the folder `tables`."""
 
 import csv
 from dataclasses import replace
 from functools import cache, partial
 from importlib import resources
-from typing import Any
 
 import numpy as np
 
-from holdfast.plugins import PluginGroup
 from holdfast.sensors.types import Array, Hand, HandModule, Sensor, Unit
 
 UINT16 = (0.0, 65535.0)
@@ -20,23 +18,18 @@ fingertip frame (x palmar, z distal). Every finger has this mount: rpy (90, 0, 9
 
 
 def sensor(name: str) -> Sensor:
-    """Return the built-in sensor of this name, or that of a plug-in.
+    """Return the built-in sensor of this name.
 
     Raises:
-        ValueError: there is no sensor of this name.
+        ValueError: there is no built-in sensor of this name.
 
     Example:
         >>> sensor("uskin-curved").n_taxels
         30
     """
-    if name in SENSORS:
-        return SENSORS[name]()
-    skin = SENSOR_PLUGINS.load(name)
-    if skin is None:
-        raise ValueError(
-            f"unknown sensor {name!r}; built in are {', '.join(SENSORS)}{SENSOR_PLUGINS.text()}"
-        )
-    return skin
+    if name not in SENSORS:
+        raise ValueError(f"unknown sensor {name!r}; built in are {', '.join(SENSORS)}")
+    return SENSORS[name]()
 
 
 def hand(name: str) -> Hand:
@@ -57,11 +50,6 @@ def hand(name: str) -> Hand:
 def built_in_sensors() -> tuple[str, ...]:
     """Return the names of the built-in sensors."""
     return tuple(SENSORS)
-
-
-def sensor_names() -> tuple[str, ...]:
-    """Return the names of all sensors: the built-in ones, then those of plug-ins."""
-    return (*SENSORS, *SENSOR_PLUGINS.names())
 
 
 def built_in_hands() -> tuple[str, ...]:
@@ -187,20 +175,6 @@ SENSORS = {
 """Functions that make the built-in sensors, by name."""
 HANDS = {"allegro-uskin": allegro_uskin}
 """Functions that make the built-in hands, by name."""
-
-
-def _plugin_sensor(name: str, loaded: Any) -> Sensor:  # noqa: ANN401
-    """Return the sensor of a plug-in: a `Sensor`, or a function that returns one."""
-    skin = loaded() if callable(loaded) else loaded
-    if not isinstance(skin, Sensor):
-        raise TypeError(f"a Sensor or a function that returns one expected, {skin!r} given")
-    if skin.name != name:
-        raise ValueError(f"a sensor with the name {name} expected, {skin.name} given")
-    return skin
-
-
-SENSOR_PLUGINS = PluginGroup("sensors", SENSORS, _plugin_sensor)
-"""Sensors of other packages."""
 
 
 def _table(name: str) -> list[dict[str, str]]:

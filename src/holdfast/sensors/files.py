@@ -4,7 +4,13 @@ import json
 import math
 from pathlib import Path
 
-from holdfast.sensors.built_in import built_in_hands, flat_sensor, hand, sensor, sensor_names
+from holdfast.sensors.built_in import (
+    built_in_hands,
+    built_in_sensors,
+    flat_sensor,
+    hand,
+    sensor,
+)
 from holdfast.sensors.taxel_numbers import taxel_number
 from holdfast.sensors.types import Hand, Sensor
 
@@ -18,7 +24,7 @@ def find_sensor(name: str) -> Sensor:
     """
     if Path(name).suffix.lower() == ".json":
         return Sensor.from_json(name)
-    if name in (names := sensor_names()):
+    if name in (names := built_in_sensors()):
         return sensor(name)
     raise ValueError(
         f"unknown sensor {name!r}; built in are {', '.join(names)}; or give a "
@@ -44,7 +50,7 @@ def find_layout(name: str, base: str | None) -> Sensor | Hand:
         return Sensor.from_urdf(name, base)
     if base is not None:
         raise ValueError(f"--base belongs to a .urdf file; {name!r} given")
-    hands, sensors = built_in_hands(), sensor_names()
+    hands, sensors = built_in_hands(), built_in_sensors()
     if suffix != ".json" and name not in (*hands, *sensors):
         raise ValueError(
             f"unknown sensor or hand {name!r}; built in are {', '.join(sensors + hands)}; "

@@ -400,15 +400,6 @@ class TestNumbersOfTaxels:
         assert {tuple(line["faulty_taxels"]) for line in got} == {()}
         assert {tuple(line["faults"]) for line in got} == {()}
 
-    def test_the_numbers_are_those_of_the_configuration(
-        self, capsys, model, spoilt, tmp_path, monkeypatch
-    ):
-        config = tmp_path / "holdfast.toml"
-        config.write_text("ignore = {index = [1, 7, 30]}")
-        monkeypatch.setenv("HOLDFAST_CONFIG", str(config))
-        got, _ = lines(capsys, model, spoilt)
-        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
-
     def test_the_numbers_are_those_of_the_sensor(self, capsys):
         assert main(["sensors", "uskin-curved"]) == 0
         rows = capsys.readouterr().out.splitlines()[-30:]

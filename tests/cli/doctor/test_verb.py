@@ -97,21 +97,6 @@ def test_no_data(capsys, monkeypatch):
     assert "not set" in capsys.readouterr().out
 
 
-def test_the_configuration_of_the_hand(capsys, monkeypatch, tmp_path):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("HOLDFAST_CONFIG", raising=False)
-    assert report(capsys)["config"] == {"path": None, "content": {}, "error": None}
-    (tmp_path / "holdfast.toml").write_text('model = "builtin:twin"\n')
-    config = report(capsys)["config"]
-    assert config == {
-        "path": "holdfast.toml", "content": {"model": "builtin:twin"}, "error": None,
-    }  # fmt: skip
-    (tmp_path / "holdfast.toml").write_text("modle = 1\n")
-    assert report(capsys)["config"]["error"].startswith("holdfast.toml: unknown key modle; there")
-    assert main(["doctor"]) == 0
-    assert "WRONG: holdfast.toml: unknown key modle" in capsys.readouterr().out
-
-
 def test_what_can_be_reached(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.devices.sources.xela.places.own_address", lambda: None)
     found = report(capsys)["sources"]

@@ -12,8 +12,6 @@ from holdfast_ros import dds
 from holdfast_ros.sensor_messages import SampleDecoder, known_definition
 from holdfast_ros.sources.topic import ReceivedMessage, Subscription, TopicSource, topic_of
 
-PARAMETERS = ("domain", "values", "fingers", "sensor")
-"""Names of the parameters of the URI."""
 DISCOVERY_INTERVAL = 0.05
 """Time between two checks for the first publisher [s]."""
 SUPPORTED_TYPES = "xela_server_ros2/SensStream, sensor_interfaces/SensorState"
@@ -28,7 +26,7 @@ def source(address: Address) -> Source:
     Raises:
         ValueError: the address or a parameter is not valid.
     """
-    address.only(*PARAMETERS)
+    address.only("domain", "values", "fingers", "sensor")
     domain = dds.domain_number(address.parameters.get("domain"))
     return TopicSource(address, Ros2Subscription(topic_of(address), domain))
 

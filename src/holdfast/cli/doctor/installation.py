@@ -4,24 +4,17 @@ import os
 import platform
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from holdfast.cli.extensions import plugin_states
 from holdfast.cli.terminal.console import print_line, print_table
 from holdfast.errors import EXTRA_PURPOSES, install_command, package_versions
+from holdfast.removed import REMOVED
 from holdfast.threads import usable_processors
 
-if TYPE_CHECKING:
-    from holdfast.cli.config import Config
 
-
-def installation(config: "Config | None") -> dict[str, Any]:
-    """Return the state of the installation as JSON values.
-
-    Args:
-        config: of `--config`; by default that of the file which verbs read.
-    """
-    from holdfast.cli.config import config_state
+def installation() -> dict[str, Any]:
+    """Return the state of the installation as JSON values."""
     from holdfast.devices.uri import source_states
     from holdfast.io.foreign import limits
 
@@ -54,7 +47,6 @@ def installation(config: "Config | None") -> dict[str, Any]:
         "kernels": {"ok": error is None, "error": error},
         "limits": limits(),
         "data": {"path": data, "found": data is not None and Path(data).is_dir()},
-        "config": config_state(config),
         "sources": source_states(),
         "plugins": [plugin._asdict() for plugin in plugin_states()],
     }
@@ -66,16 +58,11 @@ def print_installation(report: dict[str, Any]) -> None:
     found = "found" if data["found"] else "NOT FOUND"
     held = ", ".join(name for name, holds in limits.items() if holds)
     lacking = ", ".join(name for name, holds in limits.items() if not holds)
-    config = report["config"]
-    hand = ", ".join(f"{key} {value}" for key, value in config["content"].items())
-    hand = hand or "none: holdfast.toml in this folder, or HOLDFAST_CONFIG"
-    hand = f"WRONG: {config['error']}" if config["error"] else hand
     rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
     rows += [
         ("kernel", "works" if kernels["ok"] else kernels["error"]),
         ("limits of imports", (held or "none") + (f" (NOT {lacking})" if lacking else "")),
         ("HOLDFAST_DATA", "not set" if data["path"] is None else f"{data['path']} ({found})"),
-        ("your hand", hand),
     ]
     packages = [(name, version or "MISSING") for name, version in report["packages"].items()]
     extras = [
@@ -85,6 +72,7 @@ def print_installation(report: dict[str, Any]) -> None:
     plugins = [
         (x["name"], x["kind"], x["package"], f"SKIPPED: {x['error']}" if x["error"] else "works")
         for x in report["plugins"]
+        if x["kind"] not in REMOVED["plugins"]
     ]
     print_table(("holdfast", report["holdfast"]), rows)
     for header, table in (
@@ -96,3 +84,6 @@ def print_installation(report: dict[str, Any]) -> None:
         if table:
             print_line()
             print_table(header, table)
+    for x in report["plugins"]:
+        if x["kind"] in REMOVED["plugins"]:
+            print_line(f"plug-in {x['name']} of {x['package']} is skipped: {x['error']}")

@@ -15,7 +15,6 @@ HEALTHY = "nothing is wrong, and nothing is worse than at the last check"
 
 
 def doctor(
-    context: typer.Context,
     source: Annotated[
         str | None, typer.Argument(help="Source or recording whose modules are checked.")
     ] = None,
@@ -32,8 +31,8 @@ def doctor(
 
     Report Python, the packages, the extras and how to install them, the kernel, the
     live sources that can be reached, which limits this system has for imports (time of the
-    processor, memory), the plug-ins of other packages, the configuration file of
-    the hand, and the folder in HOLDFAST_DATA. The exit code is always 0.
+    processor, memory), the plug-ins of other packages, and the folder in HOLDFAST_DATA. The
+    exit code is always 0.
 
     With SOURCE, read ten seconds of the open hand, which nothing touches, and report for each
     module the rate, the jitter, the gaps, the noise by axis and of the loudest taxel, dead and
@@ -52,7 +51,7 @@ def doctor(
         raise ValueError("--plot and --history are for the modules of a source; SOURCE expected")
     from holdfast.cli.doctor.installation import installation, print_installation
 
-    report = installation(context.obj)
+    report = installation()
     print_json(report) if as_json else print_installation(report)
 
 

@@ -15,7 +15,7 @@ from holdfast.cli.options import (
     ServerOptions,
     SpeedOption,
     StartOptions,
-    complete_source,
+    check_source,
 )
 from holdfast.cli.teach.options import TEACH_ADDRESS, WITHOUT_PROTOCOL, GuideOptions, calibrated
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
@@ -28,7 +28,7 @@ def teach(
         str,
         typer.Argument(
             help="URI of the hand, or twin:; leave it out with --from.",
-            callback=complete_source,
+            callback=check_source,
             show_default=False,
         ),
     ] = "",

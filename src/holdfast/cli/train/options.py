@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 def list_classifiers(name: str | None) -> str | None:
     """Return a name; print all names and exit if it is `list`."""
     if name == "list":
-        from holdfast.classifiers import recipe_names
+        from holdfast.classifiers import RECIPES
 
-        print_lines(recipe_names())
+        print_lines(RECIPES)
         raise typer.Exit
     return name
 

@@ -18,8 +18,6 @@ try:
 except ImportError as missing:
     raise MissingExtra("pyserial", "serial") from missing
 
-PARAMETERS = ("sensor", "fingers", "baud", "mags")
-"""Names of the parameters of the URI."""
 SERIAL_OPEN_TIMEOUT = 3.0
 """Longest wait for the first sample [s]; boards restart when their port is opened."""
 DEFAULT_BAUD = 115200
@@ -45,7 +43,7 @@ class SerialSource(DeviceSource):
 
     def __init__(self, address: Address) -> None:
         super().__init__()
-        address.only(*PARAMETERS)
+        address.only("sensor", "fingers", "baud", "mags")
         self.name = address.text
         self._path = address.host + address.path
         if not self._path:

@@ -12,7 +12,6 @@ import pytest
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
-from holdfast.cli.config import Config
 from holdfast.devices.sources import open_source
 from holdfast.devices.uri import parse
 from holdfast.errors import SourceError
@@ -188,8 +187,3 @@ def test_unknown_parameters():
 def test_the_path_is_the_topic():
     scheme, address = parse("ros2:///xServTopic")
     assert (scheme, address.host, address.path) == ("ros2", "", "/xServTopic")
-
-
-def test_the_file_of_the_hand_completes_the_uri():
-    config = Config(source="ros2:///a?domain=1", fingers={"1": "thumb"}, values="counts")
-    assert config.complete("hand") == "ros2:///a?domain=1&fingers=1:thumb&values=counts"

@@ -6,8 +6,6 @@ from contextlib import suppress
 from holdfast.devices.sources.base import Source
 from holdfast.devices.uri import Address, parse
 
-PARAMETERS = ("values", "fingers", "sensor")
-"""Names of the parameters of the URI."""
 PROBE_TIMEOUT = 0.3
 """Time in which a server must accept a connection [s]."""
 
@@ -26,7 +24,7 @@ def source(address: Address) -> Source:
     from holdfast.devices.sources.xela.client import XelaSource
     from holdfast.devices.sources.xela.places import places
 
-    address.only(*PARAMETERS)
+    address.only("values", "fingers", "sensor")
     return XelaSource(
         address.text,
         places(address),
