@@ -5,11 +5,18 @@ LAST_COMMIT = "f7d623e5"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {},
-    "options": {},
-    "sources": {},
+    "options": {
+        "play --hand": "holdfast hold twin:?object=can --hand twin:",
+        "serve --ros1": "record topics with rosbag record, then holdfast import run.bag recordings",
+    },
+    "sources": {
+        "ros1": "rosbag record -O run.bag /xServTopic, then holdfast import run.bag recordings",
+    },
     "importers": {},
     "exporters": {},
-    "hands": {},
+    "hands": {
+        "ros1": "ros2:NAME (docs/hands.md), or call:MODULE:FUNCTION with a function on rospy",
+    },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
 `verbs`, `options`, `sources`, ...; an option has its verb before it, as in "serve --hand"."""

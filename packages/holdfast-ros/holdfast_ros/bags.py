@@ -73,9 +73,10 @@ class Bag:
                 with suppress(ValueError):  # a topic that cannot be read does not hide the others
                     definitions[key] = parse_definition(*key)
             elif key not in definitions:
-                standard = standard_definition(one.msgtype) if ros2 else None
-                # Messages of known sensors first: ROS itself has none of these types.
-                definitions[key] = known_definition(one.msgtype, ros2=ros2) or standard
+                definitions[key] = None
+                if ros2:  # messages of known sensors first: ROS itself has none of these types
+                    standard = standard_definition(one.msgtype)
+                    definitions[key] = known_definition(one.msgtype) or standard
             topic = BagTopic(one.topic, kind, definitions[key], one.msgcount, one.id)
             self.topics.append(topic)
 

@@ -87,7 +87,7 @@ class Subscription:
             if time.monotonic() >= deadline:
                 raise SourceError(self.why_no_message())
             time.sleep(DISCOVERY_INTERVAL)
-        definition = known_definition(kind, ros2=True)
+        definition = known_definition(kind)
         if definition is None:
             raise SourceError(
                 f"{self._topic} has messages of type {kind}; supported types: {SUPPORTED_TYPES}"
