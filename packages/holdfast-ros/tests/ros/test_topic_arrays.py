@@ -1,5 +1,4 @@
-"""Topics of any type: arrays of numbers, points, and clouds; their times, and cut bags."""
-
+"""Topics of any type: arrays of numbers, points, and clouds, and their times."""
 
 import numpy as np
 import pytest
