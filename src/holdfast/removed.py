@@ -7,7 +7,7 @@ REMOVED: dict[str, dict[str, str]] = {
     "verbs": {},
     "options": {
         "play --hand": "holdfast hold twin:?object=can --hand twin:",
-        "serve --ros1": "record topics with rosbag record, then holdfast import run.bag recordings",
+        "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {
         "ros1": "rosbag record -O run.bag /xServTopic, then holdfast import run.bag recordings",

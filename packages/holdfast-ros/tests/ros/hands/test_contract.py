@@ -59,6 +59,7 @@ def test_every_row_of_the_table_has_an_imitation_of_its_driver():
     assert {open_hand(driver.uri).name.partition("?")[0] for driver in ROS2.values()} == {
         f"ros2:{name}" for name in hand_rows()
     }
+    assert all(row["source"] for row in hand_rows().values())
 
 
 def test_each_joint_state_is_reported_once_in_the_order_of_the_hand(states_rig):
