@@ -153,6 +153,16 @@ ROS2 = {
         {"/gripper/joint_trajectory": TRAJECTORY}, "/joint_states", FINGER_NAMES,
         effort=4.0, strength=2000.0,
     ),
+    "width-gripper-number": Driver(
+        f"ros2:width-gripper?topic=/gripper/command&type=Float64&states=/gripper/joint_states"
+        f"&{WIDTH}",
+        {"/gripper/command": "std_msgs/Float64"}, "/gripper/joint_states", FINGER_NAMES,
+        effort=4.0, strength=2000.0,
+    ),
+    "width-gripper-array": Driver(
+        f"ros2:width-gripper?topic=/gripper/commands&type=Float64MultiArray&{WIDTH}",
+        {"/gripper/commands": FLOATS}, "/joint_states", FINGER_NAMES, effort=4.0, strength=2000.0,
+    ),
     "controller": Driver(
         f"ros2:controller?topic=/hand/joint_trajectory&joints={MIXED_JOINTS}&max_effort=0.1"
         f"&stiffness=2&home={','.join(['0.1'] * 10)}",

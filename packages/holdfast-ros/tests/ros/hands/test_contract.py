@@ -37,7 +37,7 @@ from .rigs import NAMES, WITH_STATES, RosRigs
 
 pytestmark = pytest.mark.slow
 
-GRIPPERS = ("gripper", "parallel-gripper", "width-gripper")
+GRIPPERS = [name for name in NAMES if "gripper" in name]
 
 
 @pytest.fixture(scope="module")
