@@ -107,7 +107,7 @@ def test_each_kind_is_found_by_its_name(parts):
 
 
 def test_names_are_listed_after_our_own(parts, caplog):
-    with pytest.raises(ValueError, match=r"FUNCTION; of plug-ins: grab, hollow, ros1, ros2$"):
+    with pytest.raises(ValueError, match=r"FUNCTION; of plug-ins: grab, hollow, ros2$"):
         open_hand("grip:left")
     with pytest.raises(ValueError, match=r"there are xela:, twin:, serial:, gone:, mute:, "):
         open_source("none:")

@@ -71,12 +71,11 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         ),
     },
     "holdfast-ros": {
-        "sources": ("ros1", "ros2"),
+        "sources": ("ros2",),
         "importers": ("rosbag",),
-        "publishers": ("ros1", "ros2"),
-        "hands": ("ros1", "ros2"),
-        "players": ("driven",),
-        "options": ("serve --ros2", "serve --ros1", "play --hand"),
+        "publishers": ("ros2",),
+        "hands": ("ros2",),
+        "options": ("serve --ros2",),
     },
     LABORATORY: {
         "verbs": ("bench", "study", "trial"),

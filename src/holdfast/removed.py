@@ -38,9 +38,12 @@ REMOVED: dict[str, dict[str, str]] = {
         "train --objective": "none; the search of an SVM minimises errors, any other the log loss",
         "datasets --yes": "leave it out, no set is larger than 26 MB",
         "--config": WRITTEN_OUT,
+        "play --hand": "holdfast hold twin:?object=can --hand twin:",
+        "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {
         "hand": WRITTEN_OUT,
+        "ros1": "rosbag record -O run.bag /xServTopic, then holdfast import run.bag recordings",
     },
     "importers": {
         "anyskin-slip": "holdfast import FILE OUT --sensor anyskin (without labels)",
@@ -53,7 +56,9 @@ REMOVED: dict[str, dict[str, str]] = {
         "onnx": "holdfast export MODEL model.h carries a model to other programs",
         "foxglove": "files of holdfast import RECORDINGS OUT --suffix mcap open in Foxglove",
     },
-    "hands": {},
+    "hands": {
+        "ros1": "ros2:NAME (docs/hands.md), or call:MODULE:FUNCTION with a function on rospy",
+    },
     "rules": {
         "onnx": "train a model with holdfast train, or apply a classifier of your own to what "
         "holdfast.features_frame returns",

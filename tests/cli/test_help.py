@@ -8,7 +8,7 @@ from holdfast.cli import app, main
 
 SHOWN = {
     "detect": "--summary --in-contact --sensor --seconds --json",
-    "serve": "--host --port --token-file --record-to --speed --once --in-contact --rerun --ros1 "
+    "serve": "--host --port --token-file --record-to --speed --once --in-contact --rerun "
     "--ros2 --json",
     "record": "--seconds --object --case --note --set --camera --force --json",
     "play": "--host --port --speed --once --json",

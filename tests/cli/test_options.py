@@ -12,7 +12,6 @@ OTHER_MEANING = {
     "--for": "the threshold that tune chooses, and the one answer that train fits",
     "--format": "of the input, and of exported recordings",
     "--fps": "of an exported dataset, and of a video of stickers",
-    "--hand": "the hand that play stands for is driven by another program",
     "--in-contact": "a declaration, and for an exported model a choice of two",
     "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",

@@ -33,8 +33,6 @@ def check_received(received):
     assert received["vector"] == [100.0, 0.0, -5.5]
     assert 0 <= received["age"] < 30
     assert received["level"] == 1
-    assert (received["grip"], received["scale"]) == ("HOLD", 1.25)
-    assert received["grip_message"] == "HOLD"
     assert received["values"] == {
         "state": "STABLE",
         "reason": "",

@@ -59,9 +59,8 @@ def hold(
     safe state if it dies. With SOURCE twin:... and --hand twin:, the twin is both.
 
     Hands on topics of ROS 2 (no ROS needed): ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop,
-    ros2:controller, ros2:gripper and ros2:width-gripper. Of ROS 1 (with rospy): ros1:positions,
-    ros1:efforts, ros1:envelop, ros1:gripper and ros1:width-gripper. Another program closes the
-    hand; the loop takes over when the grip begins.
+    ros2:controller, ros2:gripper and ros2:width-gripper. Another program closes the hand; the
+    loop takes over when the grip begins.
     docs/hands.md has their topics and parameters. With --json, each new command is a line of JSON.
 
     MODEL is one that was taught on this hand (holdfast teach). builtin:any reports no slip until

@@ -45,8 +45,7 @@ class GripSettings:
     hand: Annotated[
         str,
         typer.Option(
-            help="URI of the hand: twin:, ros2:KIND?..., ros1:KIND?..., log:PATH or "
-            "call:MODULE:FUNCTION."
+            help="URI of the hand: twin:, ros2:NAME?..., log:PATH or call:MODULE:FUNCTION."
         ),
     ]
     law: Annotated[str, typer.Option(help="Law of grip force.")] = "holdfast"

@@ -1,12 +1,13 @@
 """Bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap): their topics and messages, and poses in them.
 
-`holdfast_ros.bag_storage` reads the containers only. Messages stay bytes until the core's
-codec decodes them by the definitions in the bag, which are data: nothing from a bag is executed.
+rosbags reads the containers. Messages stay bytes until the core's codec decodes them by the
+definitions in the bag, which are data: nothing from a bag is executed.
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+import shlex
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -16,13 +17,9 @@ from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
 from holdfast.io.definitions import Definition, field_paths, parse_definition, short_name
 from holdfast.io.importers.table import natural_order
-from holdfast.io.safe_reading import ReadBudget, one_line
+from holdfast.io.mcap_records import has_end
+from holdfast.io.safe_reading import one_line
 from holdfast.sensors.types import Array
-from holdfast_ros.bag_storage import BagStorage
-from holdfast_ros.bag_storage.folder import METADATA, open_folder
-from holdfast_ros.bag_storage.mcap import open_mcap
-from holdfast_ros.bag_storage.ros1 import open_ros1
-from holdfast_ros.bag_storage.sqlite import open_sqlite
 from holdfast_ros.sensor_messages import known_definition
 
 MAGICS = {
@@ -31,13 +28,8 @@ MAGICS = {
     ".mcap": re.compile(rb"\x89MCAP0\r\n\x01.{8}\x04\x00\x00\x00ros2", re.DOTALL),
 }
 """First bytes of the files of bags, by suffix. MCAP has the profile of ROS 2."""
-_OPENERS: dict[str, Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]] = {
-    ".bag": open_ros1,
-    ".db3": open_sqlite,
-    ".mcap": open_mcap,
-}
-MAX_BAG_MESSAGE_SIZE = 1 << 22
-"""Maximum size of a message that is decoded [bytes]; one of 368 taxels has some 10 kB."""
+METADATA = "metadata.yaml"
+"""File in the folder of a ROS 2 bag."""
 
 
 class BagTopic(NamedTuple):
@@ -63,57 +55,44 @@ class Bag:
 
     Attributes:
         ros2: whether it is a bag of ROS 2.
-        complete: whether it has its end; else it is read up to where it was cut.
         topics: its topics, in the order of their names.
     """
 
-    def __init__(self, storage: BagStorage, budget: ReadBudget, *, ros2: bool) -> None:
-        self._storage = storage
-        self._budget = budget
+    def __init__(self, path: Path, reader: Any, *, ros2: bool) -> None:  # noqa: ANN401 (of rosbags)
+        self._path, self._reader = path, reader
         self.ros2 = ros2
-        self.complete = storage.complete
         self.topics: list[BagTopic] = []
         # Publishers of a type send the same definition, which is parsed once.
         definitions: dict[tuple[str, str], Definition | None] = {}
-        for one in sorted(storage.connections, key=lambda one: one.topic):
-            key, kind = (one.kind, one.definition), short_name(one.kind)
-            if key not in definitions and one.definition.strip():
+        for one in sorted(reader.connections, key=lambda one: one.topic):
+            # Definitions in IDL are not parsed.
+            text = one.msgdef.data if one.msgdef.format.name == "MSG" else ""
+            key, kind = (one.msgtype, text), short_name(one.msgtype)
+            if key not in definitions and text.strip():
                 definitions[key] = None
                 with suppress(ValueError):  # a topic that cannot be read does not hide the others
                     definitions[key] = parse_definition(*key)
             elif key not in definitions:
-                standard = standard_definition(one.kind) if ros2 else None
-                # Messages of known sensors first: ROS itself has none of these types.
-                definitions[key] = known_definition(one.kind, ros2=ros2) or standard
-            topic = BagTopic(one.topic, kind, definitions[key], one.n_messages, one.number)
+                definitions[key] = None
+                if ros2:  # messages of known sensors first: ROS itself has none of these types
+                    standard = standard_definition(one.msgtype)
+                    definitions[key] = known_definition(one.msgtype) or standard
+            topic = BagTopic(one.topic, kind, definitions[key], one.msgcount, one.id)
             self.topics.append(topic)
 
     def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
         """Yield topic, time of recording [s] and bytes of each message, in the order of time.
 
         Raises:
-            RecordingError: a message is too large, or there are too many.
+            RecordingError: the bag is cut or damaged.
         """
         by_number = {topic.number: topic for topic in topics}
-        if not by_number:
+        if not by_number:  # of rosbags, no connections are all
             return
-        for number, nanoseconds, data in self._storage.messages(list(by_number)):
-            if len(data) > MAX_BAG_MESSAGE_SIZE:
-                raise ValueError(
-                    f"a message of {len(data)} bytes on {by_number[number].name}; at most "
-                    f"{MAX_BAG_MESSAGE_SIZE} expected"
-                )
-            self._budget.step()
-            self._budget.unpack(len(data))
-            yield by_number[number], nanoseconds * 1e-9, data
-
-    def keep(self, n_bytes: int) -> None:
-        """Count the size of a value that is kept of a message [bytes].
-
-        Raises:
-            RecordingError: the values take more memory than the bag may have.
-        """
-        self._budget.keep(n_bytes, 1)
+        connections = [one for one in self._reader.connections if one.id in by_number]
+        with bag_errors(self._path):
+            for connection, nanoseconds, data in self._reader.messages(connections):
+                yield by_number[connection.id], nanoseconds * 1e-9, data
 
 
 def standard_definition(kind: str) -> Definition | None:
@@ -138,26 +117,52 @@ def find_bags(path: Path) -> list[Path]:
 
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
-    """Open a bag for reading; errors of libraries inside the block become `RecordingError`.
+    """Open a bag for reading.
 
     Raises:
-        RecordingError: the bag cannot be read, is cut or damaged.
+        RecordingError: rosbags cannot read it; the text has the command that recovers it.
     """
-    ros2 = path.suffix != ".bag" or path.is_dir()
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+
+    ros2 = path.is_dir() or path.suffix != ".bag"
+    with bag_errors(path):
+        reader = Reader2(path) if ros2 else Reader1(path)
+        reader.open()
     try:
-        budget = ReadBudget(path)
-        opener: Callable[[Path, ReadBudget], AbstractContextManager[BagStorage]]
-        opener = open_folder if path.is_dir() else _OPENERS[path.suffix]
-        with opener(path, budget) as storage:
-            yield Bag(storage, budget, ros2=ros2)
-    except RecordingError:
+        yield Bag(path, reader, ros2=ros2)
+    finally:
+        reader.close()
+
+
+@contextmanager
+def bag_errors(path: Path) -> Iterator[None]:
+    """Convert the errors of rosbags inside the block, which may be of any type.
+
+    Raises:
+        RecordingError: an error was raised.
+    """
+    try:
+        yield
+    except MemoryError:  # says nothing about the bag
         raise
-    except OSError as cause:
-        raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
-    except MemoryError as cause:
-        raise RecordingError(f"{path} does not fit into memory: {one_line(cause)}") from cause
-    except Exception as cause:  # libraries raise errors of any type for a damaged bag
-        raise RecordingError(f"{path} is cut or damaged: {one_line(cause)}") from cause
+    except Exception as cause:
+        raise refusal(path, one_line(cause)) from cause
+
+
+def refusal(path: Path, problem: str) -> RecordingError:
+    """Return the error of a bag that is cut or damaged, with the command that recovers it."""
+    # The index of a folder is its metadata; a file in it may be cut all the same.
+    cut = [file for file in sorted(path.glob("*.mcap")) if not has_end(file)]
+    target = cut[0] if cut else path
+    kind = "" if target.is_dir() else target.suffix
+    quoted = shlex.quote(str(target.parent if kind == ".db3" else target))
+    commands = {
+        ".bag": f"rosbag reindex {quoted}",
+        ".mcap": f"mcap recover {quoted} -o recovered.mcap",
+    }
+    command = commands.get(kind, f"ros2 bag reindex {quoted}")
+    return RecordingError(f"{path} is cut or damaged: {problem}; to recover it: {command}")
 
 
 def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
@@ -174,7 +179,6 @@ def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
         for topic, _, data in bag.messages(topics):
             for pose in decoders[topic.number](data):
                 name = pose.body or topic.name
-                bag.keep(0)  # a row of numbers counts as an object
                 rows.setdefault(name, []).append((pose.time, *pose.position, *pose.quaternion))
                 frames[name] = pose.frame
     if missing := [name for name in wanted.values() if name not in rows]:

@@ -1,9 +1,9 @@
 """Topics of ROS 2 without an installation of ROS: over DDS, by Cyclone DDS."""
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cache, partial
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 
 from cyclonedds.builtin import (
     BuiltinDataReader,
@@ -32,7 +32,7 @@ from cyclonedds.util import duration
 from holdfast.errors import SourceError
 from holdfast.io.cdr import MessageDecoder, MessageEncoder
 from holdfast.io.definitions import NUMBER_CODES, Definition, MessageField
-from holdfast_ros.link import Link, Publisher, TakeStates
+from holdfast.openable import Openable
 from holdfast_ros.topic_messages import JOINT_STATE, JointStates, topic_definition
 
 READER_QUEUE_SIZE = 256
@@ -287,11 +287,32 @@ def idl_struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type
     return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
 
 
-class Ros2Link(Link):
-    """Connection to a ROS domain.
+class Publisher(NamedTuple):
+    """Publisher of messages on a topic.
+
+    Attributes:
+        publish: publishes a message, given by its fields, and returns at once; it raises a
+            `SourceError` if ROS refuses the message.
+        n_listeners: returns the number of subscribers.
+    """
+
+    publish: Callable[[Mapping[str, Any]], None]
+    n_listeners: Callable[[], int]
+
+
+TakeStates = Callable[[], list[JointStates]]
+"""Function that returns the joint states of a hand since its last call, the oldest first. It
+raises a `SourceError` if a message is damaged."""
+
+
+class Link(Openable):
+    """Connection to a ROS domain: publishers, and joint states of hands.
 
     Args:
         domain: number of the domain as text; by default that of `ROS_DOMAIN_ID`.
+
+    Attributes:
+        where: part of the messages, and name of the network: "in ROS domain 0".
 
     Raises:
         ValueError: there is no such domain.

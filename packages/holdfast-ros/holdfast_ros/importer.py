@@ -7,7 +7,7 @@ ignored.
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,8 +23,7 @@ from holdfast.io.importers.table_recordings import ANY_MODULE
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array
-from holdfast_ros.bag_storage.folder import METADATA
-from holdfast_ros.bags import Bag, BagTopic, find_bags, open_bag, poses_of
+from holdfast_ros.bags import METADATA, Bag, BagTopic, find_bags, open_bag, poses_of, refusal
 from holdfast_ros.sensor_messages import (
     DeviceSample,
     SampleDecoder,
@@ -83,20 +82,12 @@ def read(
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
-        try:
-            if not sensors and not columns:
-                recordings = [_BagImport(path, bag).recording()]
-            else:
-                wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
-                arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
-                found = recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
-                recordings = [replace(recording, complete=bag.complete) for recording in found]
-        except RecordingError as cause:
-            if bag.complete:
-                raise
-            text = str(cause).removeprefix(f"{path} ")
-            raise RecordingError(f"{path} is cut or damaged: up to the cut it {text}") from cause
-    yield from recordings
+        if not sensors and not columns:
+            yield _BagImport(path, bag).recording()
+            return
+        wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
+        arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
+    yield from recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
 
 
 def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
@@ -230,7 +221,7 @@ class _BagImport:
         name = self._path.name if self._path.is_dir() else self._path.stem
         try:
             modules, metadata = self._modules(clock), self._metadata(topics, clock)
-            return Recording(name, modules, metadata, complete=self._bag.complete)
+            return Recording(name, modules, metadata)
         except (RecordingError, ValueError) as cause:
             raise RecordingError(f"{self._path}: {cause}") from cause
 
@@ -264,16 +255,13 @@ class _BagImport:
                 readings = readings_of(sample, "count")
                 if not len(readings):  # XELA's server sends this for a sensor off
                     continue
-                self._bag.keep(readings.nbytes)
                 key = part.name, 0 if sample.number is None else sample.number
                 self._tracks.setdefault(key, _DeviceTrack(sample)).add(sample, time)
         for topic in topics:
             n_expected = sum(part.n_messages for part in topic.parts)
-            if self._bag.complete and n_read[topic.name] < n_expected:
-                raise RecordingError(
-                    f"{self._path} is cut or damaged: {n_read[topic.name]} messages on "
-                    f"{topic.name}, {n_expected} expected"
-                )
+            if n_read[topic.name] < n_expected:
+                problem = f"{n_read[topic.name]} messages on {topic.name}, {n_expected} expected"
+                raise refusal(self._path, problem)
 
     def _modules(self, clock: str) -> dict[str, Tactile]:
         modules: dict[str, Tactile] = {}

@@ -1,4 +1,4 @@
-"""Publish estimates on topics of ROS 1 and ROS 2."""
+"""Publish estimates on topics of ROS 2."""
 
 import math
 import re
@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Iterable, Mapping
 from threading import Condition, Thread
-from typing import TYPE_CHECKING, Any, NamedTuple, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.structs import asdict
 
@@ -14,7 +14,7 @@ from holdfast.contact import ContactState, HandEstimate, Reason
 from holdfast.live.documents import numbered
 from holdfast.openable import Openable
 from holdfast.sensors.types import Unit
-from holdfast_ros.link import Link, Publisher
+from holdfast_ros.dds import Link, Publisher
 from holdfast_ros.topic_messages import (
     DIAGNOSTICS,
     FLOAT64,
@@ -27,8 +27,6 @@ from holdfast_ros.topic_messages import (
 
 if TYPE_CHECKING:
     from holdfast.live.stream_detector import StreamUpdate
-    from holdfast_grip.documents import GripDocument
-    from holdfast_grip.loop.live_grip import LiveGrip
 
 MAX_QUEUED_ESTIMATES = 64
 """Maximum number of estimates that wait for ROS; the oldest is dropped first."""
@@ -41,8 +39,6 @@ NUMBER_FIELDS = (
 )  # fmt: skip
 """Fields of an estimate with a topic of numbers for each finger; NaN where there is none."""
 NO_TORQUE_FIELDS = {"x": 0.0, "y": 0.0, "z": 0.0}
-GRIP_TEXTS = ("state", "reason")
-"""Topics of the grip loop that are texts."""
 OK, WARN, ERROR = 0, 1, 2
 """Levels of diagnostics in ROS."""
 NOT_IN_DIAGNOSTICS = frozenset({"time", "force", "cause", *NUMBER_FIELDS})
@@ -66,14 +62,7 @@ class DiagnosticStatus(NamedTuple):
     values: tuple[tuple[str, str], ...]
 
 
-class Others(TypedDict, total=False):
-    """Arguments of every publisher, see `RosPublisher`."""
-
-    namespace: str
-    grip: "LiveGrip | None"
-
-
-class RosPublisher(Openable):
+class Ros2Publisher(Openable):
     """Publish estimates in a separate thread; it never delays the caller.
 
     The topics of each finger are `NAMESPACE/FINGER/state` (text), `stable_probability`,
@@ -83,14 +72,10 @@ class RosPublisher(Openable):
     `/diagnostics` is published once a second, and when faults change. Time stamps are the host's
     time when `publish` was called.
 
-    With a grip loop there are also `NAMESPACE/grip/state` and `reason` (texts), and
-    `NAMESPACE/FINGER/force_scale` (numbers), published with every estimate and at every event.
-
     Args:
         units: of the readings, by finger.
         link: connection to ROS.
         namespace: prefix of the topics.
-        grip: the loop that controls the hand; None if there is none.
 
     Attributes:
         n_dropped: estimates that were dropped because ROS was too slow.
@@ -101,18 +86,9 @@ class RosPublisher(Openable):
             ROS name.
     """
 
-    def __init__(
-        self,
-        units: Mapping[str, Unit],
-        link: Link,
-        namespace: str = "/holdfast",
-        grip: "LiveGrip | None" = None,
-    ) -> None:
+    def __init__(self, units: Mapping[str, Unit], link: Link, namespace: str = "/holdfast") -> None:
         self._link = link
         self._publishers: dict[str, Publisher] = {}
-        self._grip = grip
-        # Set at each event of the loop, cleared when its state is published.
-        self._grip_changed = False
         self._units = dict(units)
         self._names = topic_names(units, namespace)
         self._namespace = namespace.rstrip("/")
@@ -125,8 +101,6 @@ class RosPublisher(Openable):
         self._diagnostics_due = 0.0
         self._closing = False
         self.n_dropped = self.n_failed = 0
-        if grip is not None:
-            grip.add_listener(self._wake)
 
     def open(self) -> None:
         """Connect to ROS, and start the thread.
@@ -148,9 +122,6 @@ class RosPublisher(Openable):
             topics[f"{name}/state"] = STRING
             topics |= {f"{name}/{field}": FLOAT64 for field in NUMBER_FIELDS}
             topics[f"{name}/force"] = WRENCH if self._units[finger] == "N" else VECTOR
-        if self._grip is not None:
-            topics |= dict.fromkeys((f"{self._namespace}/grip/{n}" for n in GRIP_TEXTS), STRING)
-            topics |= {f"{name}/force_scale": FLOAT64 for name in self._names.values()}
         return topics
 
     def close(self) -> None:
@@ -190,21 +161,12 @@ class RosPublisher(Openable):
     def _publish_text(self, topic: str, text: str) -> None:
         self._publish(topic, {"data": str(text)})
 
-    def _wake(self, text: str, time: float) -> None:
-        """Publish the grip loop at once; a listener of its events."""
-        with self._queue_changed:
-            self._grip_changed = True
-            self._queue_changed.notify()
-
     def _run(self) -> None:
         while True:
             with self._queue_changed:
                 # Diagnostics go on while no estimate comes.
                 until = max(self._diagnostics_due - time.monotonic(), 0.0)
-                self._queue_changed.wait_for(
-                    lambda: self._queue or self._grip_changed or self._closing, until
-                )
-                self._grip_changed = False
+                self._queue_changed.wait_for(lambda: self._queue or self._closing, until)
                 if self._closing and not self._queue:
                     return
                 item = self._queue.popleft() if self._queue else None
@@ -213,15 +175,7 @@ class RosPublisher(Openable):
                     estimate, fingers, stamp = item
                     self._newest = estimate, stamp
                     self._publish_estimate(estimate, fingers, stamp)
-                grip = None if self._grip is None else self._grip.document()
-                if grip is not None:
-                    self._publish_text(f"{self._namespace}/grip/state", grip.state)
-                    self._publish_text(f"{self._namespace}/grip/reason", grip.reason)
-                    for finger, command in grip.fingers.items():
-                        if finger in self._names:
-                            scale = number_message(command.scale)
-                            self._publish(f"{self._names[finger]}/force_scale", scale)
-                self._update_diagnostics(grip)
+                self._update_diagnostics()
             except Exception:  # of any kind; the next estimate may succeed
                 self.n_failed += 1
 
@@ -242,12 +196,10 @@ class RosPublisher(Openable):
             self._publish(f"{topic}/force", message)
         self._publish_text(f"{self._namespace}/hand/state", estimate.state)
 
-    def _update_diagnostics(self, grip: "GripDocument | None") -> None:
+    def _update_diagnostics(self) -> None:
         """Publish the diagnostics if they are due or have changed."""
         now = time.time()
         statuses = diagnostics_of(self._newest, now)
-        if grip is not None:
-            statuses.append(diagnostic_of_grip(grip))
         # A new level or text is published at once, without a wait for the period.
         levels = tuple(hash((status.level, status.message)) for status in statuses)
         if levels == self._levels and time.monotonic() < self._diagnostics_due:
@@ -265,28 +217,6 @@ class RosPublisher(Openable):
             for status in statuses
         ]
         self._publish("/diagnostics", {"header": header(now), "status": messages})
-
-
-class Ros1Publisher(RosPublisher):
-    """Publish estimates on topics of ROS 1, with rospy; by default at `ROS_MASTER_URI`."""
-
-    def __init__(
-        self, units: Mapping[str, Unit], *, master: str | None = None, **others: Unpack[Others]
-    ) -> None:
-        from holdfast_ros.rospy_node import Ros1Link
-
-        super().__init__(units, Ros1Link(master), **others)
-
-
-class Ros2Publisher(RosPublisher):
-    """Publish estimates on topics of ROS 2, over DDS; by default in `ROS_DOMAIN_ID`."""
-
-    def __init__(
-        self, units: Mapping[str, Unit], *, domain: str | None = None, **others: Unpack[Others]
-    ) -> None:
-        from holdfast_ros.dds import Ros2Link
-
-        super().__init__(units, Ros2Link(domain), **others)
 
 
 def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
@@ -312,8 +242,8 @@ def topic_names(fingers: Iterable[str], namespace: str) -> dict[str, str]:
         name = re.sub(r"/+(?=[0-9_])", "_", re.sub(r"_{2,}", "_", name))
         part = name if name[:1].isalpha() else f"finger_{name.lstrip('_')}"
         names[finger] = f"{base}/{part}"
-    # `hand` and `grip` have topics too, which no finger may take.
-    if len({*names.values(), f"{base}/hand", f"{base}/grip"}) <= len(names) + 1:
+    # `hand` has a topic too, which no finger may take.
+    if len({*names.values(), f"{base}/hand"}) <= len(names):
         raise ValueError(f"fingers {', '.join(names)} would share topics: rename one")
     return names
 
@@ -352,22 +282,3 @@ def diagnostics_of(newest: tuple[HandEstimate, float] | None, now: float) -> lis
     text = f"problem of {', '.join(faulty)}" if faulty else "no problems"
     hand = DiagnosticStatus("hand", worst, text, (("state", str(estimate.state)),))
     return [hand, *fingers]
-
-
-def diagnostic_of_grip(grip: "GripDocument") -> DiagnosticStatus:
-    """Return the health of the grip loop, with its newest command."""
-    reason = grip.failure or grip.reason
-    values = (
-        ("state", grip.state),
-        ("reason", grip.reason),
-        ("hand", grip.hand),
-        ("law", grip.law),
-        ("armed", str(grip.armed).lower()),
-        ("stopped", str(grip.stopped).lower()),
-        ("released", str(grip.released).lower()),
-        ("commands_sent", str(grip.n_sent)),
-        *((f"scale {name}", f"{one.scale:.3f}") for name, one in grip.fingers.items()),
-    )
-    level = ERROR if grip.state == "FAULT" else OK
-    message = f"{grip.state} ({reason})" if reason else grip.state
-    return DiagnosticStatus("grip", level, message, values)

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from holdfast.io.cdr import MessageDecoder
 from holdfast.io.definitions import (
-    ROS1_HEADER,
     ROS2_HEADER,
     SEPARATOR,
     Definition,
@@ -89,11 +88,11 @@ PAPILLARRAY = "papillarray"
 """Name of Contactile's sensor, which sends no model name."""
 
 
-def known_definition(name: str, *, ros2: bool) -> Definition | None:
-    """Return the definition of a type of tactile messages, or None for any other type.
+def known_definition(name: str) -> Definition | None:
+    """Return the definition in ROS 2 of a type of tactile messages, or None for any other type.
 
     Example:
-        >>> known_definition("xela_server_ros2/msg/SensStream", ros2=True).fields[0].name
+        >>> known_definition("xela_server_ros2/msg/SensStream").fields[0].name
         'sensors'
     """
     short = short_name(name)
@@ -102,7 +101,7 @@ def known_definition(name: str, *, ros2: bool) -> Definition | None:
         return parse_definition(short, SENS_STREAM.replace("xela_server_ros/", f"{package}/"))
     if short in _PILLARS:
         text = _SENSOR_STATE.replace("PACKAGE", package)
-        return parse_definition(short, text + (ROS2_HEADER if ros2 else ROS1_HEADER))
+        return parse_definition(short, text + ROS2_HEADER)
     return None
 
 

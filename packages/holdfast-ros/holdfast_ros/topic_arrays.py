@@ -59,7 +59,6 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
         )
     records: dict[str, list[dict[str, Any]]] = {}
     for topic, time, data in bag.messages(topics[n] for n in decoders):
-        bag.keep(2 * len(data))
         message = dict(shaped_fields(decoders[topic.number](data)))
         records.setdefault(topic.name, []).append({**message, "bag_time": time})
     found: dict[str, StoredArray] = {}

@@ -56,7 +56,7 @@ def serve(
     the options.
 
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
-    ros2:///xServTopic, ros1:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
+    ros2:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
 
     Example:
       holdfast serve builtin:any twin:?object=can

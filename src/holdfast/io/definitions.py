@@ -37,14 +37,13 @@ FIELD_SIZES = {
 SEPARATOR = "\n" + "=" * 80 + "\nMSG: "
 """Text between the types of a definition; the name of the next type follows."""
 
-ROS1_HEADER = SEPARATOR + "std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
 ROS2_HEADER = (
     SEPARATOR
     + "std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
     + SEPARATOR
     + "builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n"
 )
-"""Definition of the header of a message, to append to a definition."""
+"""Definition in ROS 2 of the header of a message, to append to a definition."""
 
 
 _STAMPS = {"time": ("uint32 secs", "uint32 nsecs"), "duration": ("int32 secs", "int32 nsecs")}

@@ -1,1 +1,1 @@
-"""Hands that take commands on topics of ROS 1 or ROS 2."""
+"""Hands that take commands on topics of ROS 2."""

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -11,9 +11,10 @@ from holdfast.sensors.types import Array
 from holdfast_grip.command import GripCommand
 from holdfast_grip.errors import HandError
 from holdfast_grip.limits import SLACK, Limits
-from holdfast_ros.hands.joints import LIMIT_TOLERANCE, JointGrip, JointOrder
+from holdfast_ros.dds import Link
+from holdfast_ros.hands.joints import JointOrder
+from holdfast_ros.hands.parameters import Parameters
 from holdfast_ros.hands.ros_hand import RosHand
-from holdfast_ros.link import Link
 from holdfast_ros.topic_messages import (
     JOINT_STATE,
     JOINT_TRAJECTORY,
@@ -23,15 +24,27 @@ from holdfast_ros.topic_messages import (
     trajectory_message,
 )
 
+LIMIT_TOLERANCE = 0.1
+"""Angle by which a reading may be beyond the limits of its joint [rad]: hands are calibrated by
+eye, and their stops yield."""
+WIDEST = float(np.pi)
+"""Limit of joints whose limits are not known, to both sides of 0 [rad]: a reading that is wrong by
+a whole turn is always beyond it."""
+PARAMETERS = (
+    "topic", "type", "command", "joints", "states", "effort", "max_effort", "lowest", "highest",
+    "release",
+)  # fmt: skip
+"""Names of the parameters that a hand takes in any case."""
+
 
 class JointOutput(StrEnum):
     """What a driver takes for each joint.
 
-    TORQUES: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
+    EFFORTS: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
     set-point of its position control.
     """
 
-    TORQUES = "torques"
+    EFFORTS = "efforts"
     LARGEST = "largest"
     POSITIONS = "positions"
 
@@ -52,7 +65,7 @@ class JointSetup:
         lowest: lower limits of the joints, of readings and of set-points [rad].
         highest: upper limits of the joints [rad].
         home: pose of the open hand [rad]; None to open without torque.
-        home_topic: topic for this pose; None if it is the topic of the commands.
+        home_topic: topic for this pose.
     """
 
     output: JointOutput
@@ -66,15 +79,75 @@ class JointSetup:
     lowest: Array
     highest: Array
     home: Array | None
-    home_topic: str | None
+    home_topic: str
 
     @property
     def topics(self) -> dict[str, str]:
         """Message type of each topic that is published, that of the commands first."""
-        topics = {self.topic: self.message}
-        if self.home is not None and self.home_topic is not None:
-            topics[self.home_topic] = self.message
-        return topics
+        return {self.topic: self.message, self.home_topic: self.message}
+
+    @classmethod
+    def of(cls, given: Parameters) -> Self:
+        """Return the description that the URI of a hand gives.
+
+        Raises:
+            ValueError: a parameter is missing or not valid.
+        """
+        order, output = given.joint_order(), JointOutput(given.word("command"))
+        positions = output is JointOutput.POSITIONS
+        # Measured torques would take the ceiling away from joints that carry little now.
+        largest = output is JointOutput.LARGEST
+        # A trajectory has set-points only.
+        types = [kind for kind in given.row["type"] if positions or kind != "JointTrajectory"]
+        release = given.word("release", ("limp",) if output is JointOutput.EFFORTS else ())
+        used = {"stiffness": positions, "home": release == "home", "home_topic": release == "home"}
+        given.only(*PARAMETERS, *(name for name in used if used[name]))
+        torques = None
+        if given.has("effort") or largest:
+            torques = given.joints("effort", order, each=not largest)
+        n = len(order.names)
+        lowest = given.joints("lowest", order, np.full(n, -WIDEST))
+        highest = given.joints("highest", order, np.full(n, WIDEST))
+        if not (lowest < highest).all():
+            raise ValueError(f"{given.text}: lowest below highest expected for each joint")
+        topic = given.topic("topic")
+        home, home_topic = None, topic
+        if release == "home":
+            home = given.joints("home", order, each=True)
+            home_topic = given.topic("home_topic", topic)
+            beyond = np.maximum(lowest - home, home - highest)
+            # Degrees, or angles in another order of the joints.
+            if beyond[worst := int(np.argmax(beyond))] > 0.0:
+                raise ValueError(
+                    f"{given.text}: home: {order.describe(worst)}: {lowest[worst]:g} to "
+                    f"{highest[worst]:g} rad expected, {home[worst]:g} given"
+                )
+        return cls(
+            output=output,
+            topic=topic,
+            message=given.message(types),
+            order=order,
+            max_torques=given.positive_joints("max_effort", order),
+            torques=torques,
+            states=given.topic("states") if positions or torques is None else None,
+            stiffness=given.positive_joints("stiffness", order) if positions else np.ones(n),
+            lowest=lowest,
+            highest=highest,
+            home=home,
+            home_topic=home_topic,
+        )
+
+
+class JointGrip(NamedTuple):
+    """Pose and torques of a hand when the grip began, in the order of its messages.
+
+    Attributes:
+        positions: angles (n_joints,) [rad]; NaN if they are not measured.
+        torques: torques (n_joints,) [N m].
+    """
+
+    positions: Array
+    torques: Array
 
 
 class JointHand(RosHand):
@@ -86,19 +159,17 @@ class JointHand(RosHand):
     torque_begin are medians over the joint states of the last 0.2 s.
 
     Args:
-        name: URI of the hand.
         link: connection to ROS.
-        setup: description of the hand.
-        shared: as of `RosHand`.
+        given: parameters of its URI.
 
     Attributes:
         setup: description of the hand.
     """
 
-    def __init__(self, name: str, link: Link, setup: JointSetup, *, shared: bool) -> None:
-        super().__init__(name, link, setup.topics, setup.states, shared=shared)
+    def __init__(self, link: Link, given: Parameters) -> None:
+        self.setup = setup = JointSetup.of(given)
+        super().__init__(link, given, setup.topics, setup.states)
         self.fingers = setup.order.fingers
-        self.setup = setup
         self._max_scale = 1.0
         self._grip: JointGrip | None = None
 
@@ -168,7 +239,7 @@ class JointHand(RosHand):
         if problem := self._excess(torques):
             raise HandError(problem)
         setup, time = self.setup, command.time
-        if setup.output is JointOutput.TORQUES:
+        if setup.output is JointOutput.EFFORTS:
             message = self._values(time, efforts=torques)
         elif setup.output is JointOutput.LARGEST:
             # A limit has no sign; the position control of the driver gives it.
@@ -185,7 +256,7 @@ class JointHand(RosHand):
             self._publish(setup.topic, message)
         else:
             message = self._values(0.0, positions=setup.home)
-            self._publish(setup.home_topic or setup.topic, message)
+            self._publish(setup.home_topic, message)
 
     def _values(
         self, time: float, *, positions: Array | None = None, efforts: Array | None = None
@@ -226,21 +297,4 @@ class JointHand(RosHand):
             f"{self.name}: {setup.order.describe(worst)}: a set-point at most {longest[worst]:g} "
             f"rad from the joint expected, {distance[worst]:.3g} rad given at max_scale "
             f"{self._max_scale:g}: check stiffness= [N m/rad]"
-        )
-
-
-def check_home(name: str, setup: JointSetup) -> None:
-    """Check that the pose of the open hand is within the limits of the joints.
-
-    Raises:
-        ValueError: it is not, as in degrees, or in another order of the joints.
-    """
-    if setup.home is None:
-        return
-    beyond = np.maximum(setup.lowest - setup.home, setup.home - setup.highest)
-    worst = int(np.argmax(beyond))
-    if beyond[worst] > 0.0:
-        raise ValueError(
-            f"{name}: home: {setup.order.describe(worst)}: {setup.lowest[worst]:g} to "
-            f"{setup.highest[worst]:g} rad expected, {setup.home[worst]:g} given"
         )

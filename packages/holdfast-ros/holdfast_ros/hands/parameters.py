@@ -2,32 +2,51 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from holdfast.devices.uri import Address
 from holdfast.sensors.types import Array
-from holdfast_ros.hands.joints import N_JOINTS, THUMB_FIRST
+from holdfast_ros.hands.joints import JointOrder
+from holdfast_ros.topic_messages import MESSAGE_TYPES
 
+COMMON = ("domain", "shared")
+"""Names of the parameters of every hand."""
 _TOPIC = re.compile(r"(/[A-Za-z][A-Za-z0-9_]*)+")
 
 
 class Parameters:
-    """Parameters of the URI of a hand.
+    """Parameters of the URI of a hand; what it does not give is that of the row of the hand.
 
     Args:
         address: the URI, with its parameters.
+        row: row of the hand in hands.toml.
+
+    Attributes:
+        text: the URI.
+        row: row of the hand.
     """
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, row: Mapping[str, Any]) -> None:
         self.text = address.text
+        self.row = row
+        self._address = address
         self._given = address.parameters
 
     @property
     def shared(self) -> bool:
         """Whether other publishers of the topics of the commands are allowed."""
         return self.word("shared", ("false", "true")) == "true"
+
+    def only(self, *known: str) -> None:
+        """Check that all given parameters are known; those of every hand are.
+
+        Raises:
+            ValueError: one is not among `known`.
+        """
+        self._address.only(*COMMON, *known)
 
     def has(self, name: str) -> bool:
         """Return whether a parameter is given."""
@@ -44,30 +63,31 @@ class Parameters:
         return self._numbers(name, (1,), "a number")[0]
 
     def joints(
-        self, name: str, default: Array | None = None, *, each: bool = False, n: int = N_JOINTS
+        self, name: str, order: JointOrder, default: Array | None = None, *, each: bool = False
     ) -> Array:
         """Return a value for each joint (n,), in the order of the messages.
 
         Args:
             name: name of the parameter.
-            default: value of a parameter that is not given.
+            order: the joints.
+            default: value where neither the URI nor the row has one.
             each: whether one number for all joints is refused.
-            n: number of joints.
 
         Raises:
             ValueError: there are not `n` numbers, or the parameter is missing.
         """
+        if name not in self._given and name in self.row:
+            return order.values(self.row[name])
         if name not in self._given and default is not None:
             return default
+        n = len(order.names)
         sizes, text = ((n,), "") if each else ((1, n), "a number or ")
         found = self._numbers(name, sizes, f"{text}{n} numbers, one for each joint,")
         return np.full(n, found[0]) if len(found) == 1 else np.array(found)
 
-    def positive_joints(
-        self, name: str, default: Array | None = None, *, n: int = N_JOINTS
-    ) -> Array:
+    def positive_joints(self, name: str, order: JointOrder) -> Array:
         """Return a value above 0 for each joint, as `joints`."""
-        values = self.joints(name, default, n=n)
+        values = self.joints(name, order)
         if not (values > 0).all():
             raise ValueError(
                 f"{self.text}: {name}: numbers above 0 expected, {min(values):g} given"
@@ -82,59 +102,57 @@ class Parameters:
         return value
 
     def topic(self, name: str, default: str | None = None) -> str:
-        """Return the name of a topic or of a namespace.
+        """Return the name of a topic.
 
         Raises:
             ValueError: it is not a name of ROS, or it is missing and has no default.
         """
-        topic = self._given.get(name, default)
+        topic = self._given.get(name, self.row.get(name, default))
         if topic is None or not _TOPIC.fullmatch(topic):
             given = "nothing" if topic is None else repr(topic)
             raise ValueError(f"{self.text}: {name}=/TOPIC expected, {given} given")
-        return topic
+        return str(topic)
 
-    def word(self, name: str, words: Sequence[str]) -> str:
-        """Return one of some words, by default the first.
+    def word(self, name: str, words: Sequence[str] = ()) -> str:
+        """Return one of some words, by default those of the row, and of these the first.
 
         Raises:
             ValueError: it is another word.
         """
+        words = words or self.row[name]
         word = self._given.get(name, words[0])
         if word not in words:
             raise ValueError(f"{self.text}: {name}={' or '.join(words)} expected, {word!r} given")
         return word
 
-    def fingers(self, default: Sequence[str]) -> tuple[str, ...]:
-        """Return the fingers in the order of the messages, from `order=thumb,index,...`.
+    def message(self, types: Sequence[str] = ()) -> str:
+        """Return the message type of the commands, from `type=Float64`, as `word`."""
+        kind = self.word("type", types)
+        return next(name for name in MESSAGE_TYPES if name.endswith(f"/{kind}"))
+
+    def joint_order(self) -> JointOrder:
+        """Return the joints of each finger, from `joints=thumb:th_1:th_2,index:if_1`.
 
         Raises:
-            ValueError: it is not an order of the four fingers.
+            ValueError: it has another form, a name occurs twice, or the hand has other joints.
         """
-        found = tuple(self._given.get("order", ",".join(default)).split(","))
-        if sorted(found) != sorted(THUMB_FIRST):
-            raise ValueError(
-                f"{self.text}: order={','.join(THUMB_FIRST)} expected, in any order, "
-                f"{','.join(found)!r} given"
-            )
-        return found
-
-    def named_joints(self, name: str) -> dict[str, list[str]]:
-        """Return the names of the joints of each finger, from `joints=thumb:th_1:th_2,index:if_1`.
-
-        Raises:
-            ValueError: it has another form, or a name occurs twice.
-        """
-        given = self._given.get(name)
+        known, given = self.row.get("joints"), self._given.get("joints")
+        if known and given is None:
+            return JointOrder(known)
         parts = [part.split(":") for part in (given or "").split(",")]
-        fingers, joints = [part[0] for part in parts], [one for part in parts for one in part[1:]]
+        order = {finger: names for finger, *names in parts}
+        names = [name for names in order.values() for name in names]
         is_complete = all(len(part) > 1 and all(part) for part in parts)
-        if not is_complete or len({*fingers}) < len(fingers) or len({*joints}) < len(joints):
+        if not is_complete or len(order) < len(parts) or len({*names}) < len(names):
             text = "nothing" if given is None else repr(given)
             raise ValueError(
-                f"{self.text}: {name}=thumb:JOINT:JOINT,index:JOINT expected, each name once, "
+                f"{self.text}: joints=thumb:JOINT:JOINT,index:JOINT expected, each name once, "
                 f"{text} given"
             )
-        return {finger: names for finger, *names in parts}
+        if known and {key: len(order[key]) for key in order} != {k: len(known[k]) for k in known}:
+            fingers = ", ".join(f"{len(known[finger])} of {finger}" for finger in known)
+            raise ValueError(f"{self.text}: joints: {fingers} expected, {given!r} given")
+        return JointOrder(order)
 
     def name(self, name: str) -> str:
         """Return a name that must be given.
@@ -145,10 +163,6 @@ class Parameters:
         if not self._given.get(name):
             raise ValueError(f"{self.text}: {name}=NAME expected, nothing given")
         return self._given[name]
-
-    def prefix(self, default: str) -> str:
-        """Return the beginning of the names of the joints."""
-        return self._given.get("prefix", default)
 
     def _numbers(self, name: str, sizes: Sequence[int], expected: str) -> list[float]:
         text = self._given.get(name)

@@ -12,7 +12,8 @@ from holdfast.sensors.types import Array
 from holdfast_grip.command import GripCommand
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands.base import MAX_JOINT_REPORTS, HandDevice
-from holdfast_ros.link import Link, Publisher, TakeStates
+from holdfast_ros.dds import Link, Publisher, TakeStates
+from holdfast_ros.hands.parameters import Parameters
 from holdfast_ros.topic_messages import JointStates
 
 HAND_OPEN_TIMEOUT = 5.0
@@ -42,19 +43,18 @@ class RosHand(HandDevice):
     it has no grip of its own: the drivers of these hands keep their last command anyway.
 
     Args:
-        name: URI of the hand.
         link: connection to ROS.
+        given: parameters of its URI.
         topics: message type of each topic that it publishes; the first one has the commands.
         states: topic of the joint states; None if they are not needed.
-        shared: whether other publishers of these topics are allowed.
     """
 
     def __init__(
-        self, name: str, link: Link, topics: Mapping[str, str], states: str | None, *, shared: bool
+        self, link: Link, given: Parameters, topics: Mapping[str, str], states: str | None
     ) -> None:
-        self.name = name
+        self.name = given.text
         self._link, self._topics = link, dict(topics)
-        self._states_topic, self._shared = states, shared
+        self._states_topic, self._shared = states, given.shared
         self._publishers: dict[str, Publisher] = {}
         self._take_states: TakeStates | None = None
         # Valid joint states and when they were read, newest last; `_poll` adds and drops them.
@@ -66,7 +66,7 @@ class RosHand(HandDevice):
     @property
     def resource(self) -> str:
         """What only one controller may command: the topic of the commands."""
-        return f"{next(iter(self._topics))} {self._link.network}"
+        return f"{next(iter(self._topics))} {self._link.where}"
 
     @property
     def silent(self) -> bool:

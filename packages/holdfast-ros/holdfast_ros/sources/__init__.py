@@ -1,1 +1,1 @@
-"""Sources of ROS 1 and ROS 2 topics."""
+"""Source of ROS 2 topics."""

@@ -133,8 +133,6 @@ TOPICS = {
     "/holdfast/thumb/force": WrenchStamped,
     "/holdfast/index_1/force": Vector3Stamped,
     "/holdfast/hand/state": String,
-    "/holdfast/grip/state": String,
-    "/holdfast/thumb/force_scale": Float64,
     "/diagnostics": DiagnosticArray,
 }
 

@@ -136,8 +136,10 @@ def test_a_damaged_bag(bag):
     file = path if bag.ros1 else next(Path(path).glob("*.db3"))
     data = file.read_bytes()
     file.write_bytes(data[: len(data) // 2])
-    with pytest.raises(RecordingError, match=r"bag is cut or damaged: [^\n]+$"):
+    command = "rosbag" if bag.ros1 else "ros2 bag"
+    with pytest.raises(RecordingError, match=r"bag is cut or damaged: [^\n]+$") as refusal:
         read_poses(path, {"object": "/marker"})
+    assert str(refusal.value).endswith(f"; to recover it: {command} reindex {path}")
 
 
 def test_tracks_of_a_label_rule(tmp_path):

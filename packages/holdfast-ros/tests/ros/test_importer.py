@@ -426,21 +426,23 @@ class TestRefusals:
         with bag() as given:
             for k in range(N):
                 given.xela(EPOCH + k, (1, "uSPa44", k, EPOCH + k, counts(16, k), []))
-        whole = (
-            [f for f in given.path.iterdir() if f.suffix != ".yaml"] if given.ros2 else [given.path]
-        )
-        data = whole[0].read_bytes()
+        path, whole = given.path, given.path
+        if given.ros2:
+            (whole,) = (file for file in path.iterdir() if file.suffix != ".yaml")
+        commands = {
+            ".bag": f"rosbag reindex {path}",
+            ".db3": f"ros2 bag reindex {path}",
+            ".mcap": f"mcap recover {whole} -o recovered.mcap",
+        }
+        data = whole.read_bytes()
         for size in range(100, len(data), len(data) // 7):
-            whole[0].write_bytes(data[:size])
-            try:
-                recording = read(given.path)
-            except RecordingError as caught:
-                assert str(caught).startswith(f"{given.path} is cut or damaged: ")
-                assert "\n" not in str(caught)
-            else:
-                assert given.ros2
-                assert not recording.complete
-                assert recording.modules["finger1"].n_samples <= N
+            whole.write_bytes(data[:size])
+            for part in {path, whole}:
+                with pytest.raises(RecordingError) as caught:
+                    read(part)
+                assert str(caught.value).startswith(f"{part} is cut or damaged: ")
+                assert str(caught.value).endswith(f"; to recover it: {commands[whole.suffix]}")
+                assert "\n" not in str(caught.value)
 
     def test_metadata_that_are_none(self, tmp_path):
         folder = tmp_path / "bag"

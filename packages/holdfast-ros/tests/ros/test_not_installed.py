@@ -25,11 +25,8 @@ def without_the_package(monkeypatch):
     ("words", "what"),
     [
         (["detect", "builtin:any", "ros2:///xServTopic"], "the source ros2:"),
-        (["detect", "builtin:any", "ros1:///xServTopic"], "the source ros1:"),
         (["import", "run.bag", "out", "--format", "rosbag"], "the format rosbag"),
         (["serve", "builtin:any", "twin:", "--ros2"], "the option --ros2"),
-        (["serve", "builtin:any", "twin:", "--ros1"], "the option --ros1"),
-        (["play", "twin:", "--hand", "ros2:plexus"], "the option --hand"),
         (["hold", "builtin:any", "twin:", "--hand", "ros2:plexus"], "the hand ros2:"),
     ],
     ids=lambda value: value if isinstance(value, str) else " ".join(value),
@@ -41,8 +38,8 @@ def test_a_part_of_it_is_one_line_with_the_command(capsys, words, what):
 
 def test_a_hand_in_python():
     with pytest.raises(HoldfastError) as refusal:
-        open_hand("ros1:efforts")
-    assert str(refusal.value) == f"the hand ros1: {SENTENCE}"
+        open_hand("ros2:v4")
+    assert str(refusal.value) == f"the hand ros2: {SENTENCE}"
 
 
 def test_the_other_formats_are_named(capsys, tmp_path):

@@ -5,17 +5,16 @@ from functools import partial
 
 import pytest
 
-from grip.fakes import FakeGrip
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.io.cdr import MessageEncoder
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast_ros import publisher as module
-from holdfast_ros.link import Link, Publisher
+from holdfast_ros.dds import Publisher
 from holdfast_ros.publisher import (
     ERROR,
     OK,
     WARN,
-    RosPublisher,
+    Ros2Publisher,
     diagnostics_of,
     topic_names,
 )
@@ -30,7 +29,7 @@ def test_the_diagnostic_has_the_fields_of_the_estimate_without_a_topic():
     assert set(names) >= module.NOT_IN_DIAGNOSTICS
 
 
-class FakeLink(Link):
+class FakeLink:
     """Connection that stores the messages, as what a test compares."""
 
     def __init__(self, publisher):
@@ -66,13 +65,8 @@ class FakeLink(Link):
             what = message["data"]
         self.of_test.published.append((topic, what))
 
-    def joint_states(self, topic): ...
-    def n_other_publishers(self, topic): ...
-    def subscribed_topics(self): ...
-    def published_topics(self): ...
 
-
-class FakePublisher(RosPublisher):
+class FakePublisher(Ros2Publisher):
     """Publisher that stores its messages."""
 
     def __init__(self, **given):
@@ -225,45 +219,6 @@ class TestDiagnostics:
         (after,) = diagnostics_of((estimate(), 100.0), 103.2)
         assert after[:3] == ("hand", ERROR, "no estimates any more")
         assert after.values == (("seconds_since_estimate", "3"),)
-
-
-class TestGrip:
-    def test_state_and_commands_are_published_with_every_estimate(self):
-        with FakePublisher(grip=FakeGrip()) as publisher:
-            publisher.publish(estimate(), ("thumb",))
-        assert publisher.kinds["/holdfast/grip/state"] == "std_msgs/String"
-        assert publisher.kinds["/holdfast/index_1/force_scale"] == "std_msgs/Float64"
-        assert publisher.of("/holdfast/grip/state")[-1] == "HOLD"
-        assert publisher.of("/holdfast/grip/reason")[-1] == ""
-        assert publisher.of("/holdfast/thumb/force_scale")[-1] == 1.25
-        assert publisher.of("/holdfast/index_1/force_scale") == []
-
-    def test_a_stop_is_published_while_nothing_arrives(self, monkeypatch):
-        monkeypatch.setattr(module, "DIAGNOSTICS_PERIOD", 1000.0)
-        grip = FakeGrip()
-        with FakePublisher(grip=grip) as publisher:
-            while not publisher.of("/diagnostics"):
-                time.sleep(0.005)
-            grip.stop()
-            grip.happen("grip FAULT (stopped)", 7.0)
-            while ("grip", ERROR) not in publisher.of("/diagnostics")[-1]:
-                time.sleep(0.005)
-        assert publisher.of("/holdfast/grip/reason")[-1] == "stopped"
-
-    def test_diagnostics(self):
-        well = module.diagnostic_of_grip(FakeGrip().document())
-        assert (well.name, well.level, well.message) == ("grip", OK, "HOLD")
-        values = dict(well.values)
-        assert (values["armed"], values["law"], values["scale thumb"]) == (
-            "true", "holdfast", "1.250",
-        )  # fmt: skip
-        ended = FakeGrip(state="FAULT", reason="stale", failure="the hand does not answer")
-        found = module.diagnostic_of_grip(ended.document())
-        assert (found.level, found.message) == (ERROR, "FAULT (the hand does not answer)")
-
-    def test_a_finger_cannot_have_its_name(self):
-        with pytest.raises(ValueError, match="fingers grip would share topics"):
-            topic_names(["grip"], "/holdfast")
 
 
 def test_topic_names_are_valid_in_ros():

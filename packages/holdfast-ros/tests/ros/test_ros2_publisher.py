@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
-from grip.fakes import FakeGrip
+from holdfast_ros.dds import Link
 from holdfast_ros.publisher import Ros2Publisher
 from live.estimates import UNITS, check_received, estimate
 from ros.domains import new_domain
@@ -30,7 +30,7 @@ def test_another_program_reads_what_is_published(domain):
         [sys.executable, PEER, "read", str(domain)], stdout=subprocess.PIPE, text=True
     )
     try:
-        with Ros2Publisher(UNITS, grip=FakeGrip()) as publisher:
+        with Ros2Publisher(UNITS, Link()) as publisher:
             end = time.monotonic() + 60
             while reader.poll() is None:
                 assert time.monotonic() < end, "not all topics were received"
@@ -58,13 +58,10 @@ def test_another_program_reads_what_is_published(domain):
             "vector": list(found["/holdfast/index_1/force"]["vector"].values()),
             "level": thumb["level"],
             "values": {pair["key"]: pair["value"] for pair in thumb["values"]},
-            "grip": found["/holdfast/grip/state"]["data"],
-            "scale": found["/holdfast/thumb/force_scale"]["data"],
-            "grip_message": status["holdfast: grip"]["message"],
         }
     )
 
 
 def test_domains():
     with pytest.raises(ValueError, match="a ROS domain from 0 to 232 expected, '500' given"):
-        Ros2Publisher(UNITS, domain="500")
+        Link("500")

@@ -35,6 +35,12 @@ def stored_definition(types, message, *, ros2):
     return parse_definition(name, types.generate_msgdef(name, ros_version=2 if ros2 else 1)[0])
 
 
+def definitions_of(types, message, *, ros2):
+    """The definition as ROS keeps it, and of ROS 2 that which is known here."""
+    stored = stored_definition(types, message, ros2=ros2)
+    return (stored, known_definition(message.__msgtype__)) if ros2 else (stored,)
+
+
 @ROS
 def test_a_stream_of_xela(ros2):
     package = "xela_server_ros2" if ros2 else "xela_server_ros"
@@ -47,11 +53,7 @@ def test_a_stream_of_xela(ros2):
         (1, "uSCuAH", 7, 1619157045.25, thumb, forces),
         (4, "uSPa44", 2**32 - 1, 0.0, tip, []),
     )
-    definitions = (
-        stored_definition(types, message, ros2=ros2),
-        known_definition(message.__msgtype__, ros2=ros2),
-    )
-    for definition in definitions:
+    for definition in definitions_of(types, message, ros2=ros2):
         one, two = SampleDecoder(definition, ros2=ros2)(encoded(types, message, ros2=ros2))
         assert one[:5] == (1, "uSCuAH", 1619157045.25, None, 7)
         assert two[:5] == (4, "uSPa44", None, None, 2**32 - 1)
@@ -86,10 +88,7 @@ def test_pillars(ros2):
     types = store(package, PILLARS, ros2=ros2)
     forces = np.random.default_rng(2).normal(size=(9, 3)).astype(np.float32)
     message = sensor_state(types, package, 1_500_000, 12.25, forces, ros2=ros2)
-    for definition in (
-        stored_definition(types, message, ros2=ros2),
-        known_definition(f"{package}/SensorState", ros2=ros2),
-    ):
+    for definition in definitions_of(types, message, ros2=ros2):
         (one,) = SampleDecoder(definition, ros2=ros2)(encoded(types, message, ros2=ros2))
         assert one[:5] == (None, "papillarray", 1.5, 12.25, None)
         assert one.counts is None
@@ -100,10 +99,7 @@ def test_pillars_of_ros2_with_small_letters_and_without_headers():
     types = store("sensor_interfaces", PILLARS_OF_ROS2, ros2=True)
     forces = np.random.default_rng(2).normal(size=(9, 3)).astype(np.float32)
     message = sensor_state_of_ros2(types, "sensor_interfaces", 1_500_000, forces)
-    for definition in (
-        stored_definition(types, message, ros2=True),
-        known_definition(message.__msgtype__, ros2=True),
-    ):
+    for definition in definitions_of(types, message, ros2=True):
         decode = SampleDecoder(definition, ros2=True)
         for _ in range(2):
             (sample,) = decode(encoded(types, message, ros2=True))
@@ -130,8 +126,8 @@ def test_points_whose_axes_come_in_another_order():
 
 
 def test_unknown_messages():
-    assert known_definition("std_msgs/msg/String", ros2=True) is None
-    assert known_definition("other/SensStream", ros2=True) is None
+    assert known_definition("std_msgs/msg/String") is None
+    assert known_definition("other/SensStream") is None
     with pytest.raises(ValueError, match="pkg/Text is not supported; supported are xela"):
         SampleDecoder(parse_definition("pkg/Text", "string text"), ros2=False)
     signed = SENS_STREAM.replace("uint16", "int16")

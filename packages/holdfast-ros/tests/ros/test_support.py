@@ -4,12 +4,11 @@ from pathlib import Path
 
 import pytest
 
-from holdfast_ros.hands.kinds import HAND_KINDS
+from holdfast_ros.hands.table import hand_rows
 
 PAGE = (Path(__file__).parents[4] / "docs" / "support.md").read_text("utf-8")
-KINDS = [f"{scheme}:{kind}" for scheme, kinds in HAND_KINDS.items() for kind in kinds]
 
 
-@pytest.mark.parametrize("name", [*KINDS, *(f"{scheme}:" for scheme in HAND_KINDS)])
+@pytest.mark.parametrize("name", [*(f"ros2:{name}" for name in hand_rows()), "ros2:"])
 def test_it_is_in_the_table(name):
     assert f"`{name}`" in PAGE

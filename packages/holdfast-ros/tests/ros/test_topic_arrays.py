@@ -1,13 +1,10 @@
-"""Topics of any type: arrays of numbers, points, and clouds; their times, and cut bags."""
-
-import os
+"""Topics of any type: arrays of numbers, points, and clouds, and their times."""
 
 import numpy as np
 import pytest
 
-from holdfast.cli import main
 from holdfast.errors import RecordingError
-from holdfast.io import import_recordings, load_recording
+from holdfast.io import import_recordings
 from holdfast.sensors import sensor
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
@@ -207,25 +204,3 @@ def forget_definitions(path):
     (file,) = path.glob("*.db3")
     with sqlite3.connect(file) as base:
         base.execute("DELETE FROM message_definitions")
-
-
-@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-@pytest.mark.parametrize("with_metadata", [False, True])
-def test_a_cut_bag_is_read_up_to_the_cut(capsys, tmp_path, storage, with_metadata):
-    bag = AnyBag(tmp_path / "a", storage)
-    noise = np.random.default_rng(0).normal(size=(N, 9000)).astype(np.float32)
-    path = bag.write(
-        {"/skin": lambda k: bag.numbers(READINGS[k]), "/noise": lambda k: bag.numbers(noise[k])}
-    )
-    (file,) = (one for one in path.iterdir() if one.suffix != ".yaml")
-    os.truncate(file, file.stat().st_size * 4 // 5)
-    if not with_metadata:
-        (path / "metadata.yaml").unlink()
-    words = ["import", str(path), str(tmp_path / "out"), "--topic", "/skin=anyskin"]
-    assert main(words) == 0
-    assert "is cut off: 0." in capsys.readouterr().err
-    recording = load_recording(next((tmp_path / "out").iterdir()))
-    n = recording.modules["finger1"].n_samples
-    assert not recording.complete
-    assert N // 5 < n < N * 9 // 10
-    np.testing.assert_array_equal(recording.modules["finger1"].readings, READINGS[:n])

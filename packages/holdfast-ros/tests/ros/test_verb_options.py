@@ -1,9 +1,6 @@
-import sys
-
 import pytest
 
 from holdfast.cli import main
-from holdfast.errors import MissingExtra
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast_ros import verb_options
@@ -33,25 +30,4 @@ def test_estimates_that_ros_refuses_are_reported(capsys, monkeypatch, grasp):
     assert main([*words, "--ros2"]) == 0
     assert capsys.readouterr().err.endswith(
         "Refuser: 7 estimates were refused, 2 were dropped because it was too slow\n"
-    )
-
-
-def test_only_the_twin_takes_commands(capsys, grasp):
-    plexus = "ros2:plexus?effort=0.1&max_effort=0.3"
-    for source, hand, text in (
-        (str(grasp), plexus, f"--hand needs the source twin:..., {grasp} given"),
-        ("twin:", "log:x", f"{plexus} expected, log:x given"),
-    ):
-        assert main(["play", source, "--hand", hand]) == 2
-        assert capsys.readouterr().err.splitlines()[-1] == f"holdfast: {text}"
-
-
-def test_the_twin_takes_commands_with_grip_control_only(capsys, monkeypatch):
-    for name in [name for name in sys.modules if name.startswith("holdfast_ros.hands")]:
-        monkeypatch.delitem(sys.modules, name)
-    for name in [name for name in sys.modules if name.startswith("holdfast_grip")]:
-        monkeypatch.setitem(sys.modules, name, None)
-    assert main(["play", "twin:", "--hand", "ros2:plexus?effort=0.1&max_effort=0.3"]) == 2
-    assert capsys.readouterr().err.splitlines()[-1] == (
-        f"holdfast: {MissingExtra('holdfast_grip', 'grip')}"
     )

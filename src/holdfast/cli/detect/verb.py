@@ -48,8 +48,8 @@ def detect(
 
     SOURCE is the path of a recording, or the URI of a live source, which is read until Ctrl-C or
     for --seconds:
-    xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic, ros1:///xServTopic
-    or serial:///dev/ttyACM0?sensor=anyskin. A CSV file is read directly, as holdfast import does,
+    xela://HOST:PORT (or xela://auto), twin:?object=can, ros2:///xServTopic or
+    serial:///dev/ttyACM0?sensor=anyskin. A CSV file is read directly, as holdfast import does,
     into memory.
 
     Example:

@@ -12,6 +12,7 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 
 from holdfast.contact import ContactState
 from holdfast.io.definitions import NUMBER_CODES
+from holdfast_ros.dds import Link
 from holdfast_ros.publisher import Ros2Publisher, diagnostics_of
 from holdfast_ros.topic_messages import (
     DIAGNOSTICS,
@@ -145,7 +146,7 @@ def example(monkeypatch):
 
 def check_topics(node, unit):
     """Check that holdfast publishes each topic of a node, with that type."""
-    published = Ros2Publisher(dict.fromkeys(FINGERS, unit)).topics()
+    published = Ros2Publisher(dict.fromkeys(FINGERS, unit), Link()).topics()
     assert node.subscriptions
     for topic, (kind, _) in node.subscriptions.items():
         assert KINDS[published[topic]] is kind, topic

@@ -11,7 +11,7 @@ THUMB_LAST = ("index", "middle", "ring", "thumb")
 POSITIONS = [0.27 + 0.002 * k for k in range(16)]
 EFFORTS = [0.02 + 0.001 * k for k in range(16)]
 AH_NAMES = [f"ah_joint{finger}{joint}" for finger in range(4) for joint in range(4)]
-ROS1_NAMES = [f"joint_{k}.0" for k in range(16)]
+V5_NAMES = [f"joint_{k}.0" for k in range(16)]
 SIXTEEN = ",".join(["0.1"] * 16)
 OPEN_WIDTH = 0.08
 PLEXUS = "/allegro_hand_position_effort_controller"
@@ -130,7 +130,7 @@ ROS2 = {
     ),
     "v5": Driver(
         f"ros2:v5?max_effort=0.2&stiffness=2&home={SIXTEEN}",
-        {"/allegroHand/joint_cmd": JOINTS}, "/allegroHand/joint_states", ROS1_NAMES, THUMB_LAST,
+        {"/allegroHand/joint_cmd": JOINTS}, "/allegroHand/joint_states", V5_NAMES, THUMB_LAST,
         stiffness=[2.0] * 16, home=[0.1] * 16,
     ),
     "v5-envelop": Driver(
@@ -153,6 +153,16 @@ ROS2 = {
         {"/gripper/joint_trajectory": TRAJECTORY}, "/joint_states", FINGER_NAMES,
         effort=4.0, strength=2000.0,
     ),
+    "width-gripper-number": Driver(
+        f"ros2:width-gripper?topic=/gripper/command&type=Float64&states=/gripper/joint_states"
+        f"&{WIDTH}",
+        {"/gripper/command": "std_msgs/Float64"}, "/gripper/joint_states", FINGER_NAMES,
+        effort=4.0, strength=2000.0,
+    ),
+    "width-gripper-array": Driver(
+        f"ros2:width-gripper?topic=/gripper/commands&type=Float64MultiArray&{WIDTH}",
+        {"/gripper/commands": FLOATS}, "/joint_states", FINGER_NAMES, effort=4.0, strength=2000.0,
+    ),
     "controller": Driver(
         f"ros2:controller?topic=/hand/joint_trajectory&joints={MIXED_JOINTS}&max_effort=0.1"
         f"&stiffness=2&home={','.join(['0.1'] * 10)}",
@@ -162,33 +172,6 @@ ROS2 = {
     "effort-controller": Driver(
         f"ros2:controller?topic=/hand/commands&joints={MIXED_JOINTS}&max_effort=0.1&command=efforts",
         {"/hand/commands": FLOATS}, "/joint_states", MIXED_NAMES, MIXED, counts=MIXED_COUNTS,
-    ),
-}  # fmt: skip
-
-ROS1 = {
-    "positions": Driver(
-        "ros1:positions", {"/allegroHand/joint_cmd": JOINTS}, "/allegroHand/joint_states",
-        ROS1_NAMES, THUMB_LAST, stiffness=[10 / 3] * 16, home=home(THUMB_LAST),
-    ),
-    "efforts": Driver(
-        "ros1:efforts?namespace=/allegroHand_0", {"/allegroHand_0/torque_cmd": JOINTS},
-        "/allegroHand/joint_states", ROS1_NAMES, THUMB_LAST,
-    ),
-    "envelop": Driver(
-        "ros1:envelop?effort=0.5&max_effort=1.5",
-        {"/allegroHand/envelop_torque": "std_msgs/Float32",
-         "/allegroHand/lib_cmd": "std_msgs/String"},
-        order=THUMB_FIRST, effort=0.5,
-    ),
-    "gripper": Driver(
-        "ros1:gripper?topic=/gripper/force&type=Float32&effort=4&max_effort=10",
-        {"/gripper/force": "std_msgs/Float32"}, effort=4.0,
-    ),
-    "width-gripper": Driver(
-        f"ros1:width-gripper?topic=/gripper/command&type=Float64&states=/gripper/joint_states"
-        f"&{WIDTH}",
-        {"/gripper/command": "std_msgs/Float64"}, "/gripper/joint_states", FINGER_NAMES,
-        effort=4.0, strength=2000.0,
     ),
 }  # fmt: skip
 

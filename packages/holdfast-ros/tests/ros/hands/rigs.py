@@ -6,15 +6,10 @@ from grip.hands.rigs import Rigs
 from holdfast_grip.hands import open_hand
 from ros.domains import new_domain
 
-from .drivers import ROS1, ROS2, Ros2Driver
+from .drivers import ROS2, Ros2Driver
 
-NAMES = [*(f"ros2:{name}" for name in ROS2), *(f"ros1:{name}" for name in ROS1)]
-WITH_STATES = [
-    f"{scheme}:{name}"
-    for scheme, drivers in (("ros2", ROS2), ("ros1", ROS1))
-    for name, driver in drivers.items()
-    if driver.states is not None
-]
+NAMES = list(ROS2)
+WITH_STATES = [name for name, driver in ROS2.items() if driver.states is not None]
 
 
 class RosRig:
@@ -65,20 +60,7 @@ def with_parameter(uri, text):
 
 
 class RosRigs(Rigs):
-    """Rigs by name, `ros2:NAME` or `ros1:NAME`; those of ROS 1 share a world."""
-
-    _world = None
+    """Rigs by the name of the driver."""
 
     def _new(self, name):
-        scheme, _, kind = name.partition(":")
-        if scheme == "ros2":
-            return ros2_rig(kind)
-        from .ros1 import Ros1Rig, Ros1World
-
-        self._world = self._world or Ros1World(self._new_folder())
-        return Ros1Rig(self._world, kind)
-
-    def close(self):
-        super().close()
-        if self._world is not None:
-            self._world.close()
+        return ros2_rig(name)

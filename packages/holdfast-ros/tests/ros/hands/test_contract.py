@@ -28,14 +28,16 @@ from grip.hands.test_contract import (  # noqa: F401 (pytest runs the tests)
 )
 from holdfast_grip import Limits
 from holdfast_grip.errors import HandError
+from holdfast_grip.hands import open_hand
 from holdfast_ros.hands import ros_hand
+from holdfast_ros.hands.table import hand_rows
 
-from .drivers import POSITIONS
+from .drivers import POSITIONS, ROS2
 from .rigs import NAMES, WITH_STATES, RosRigs
 
 pytestmark = pytest.mark.slow
 
-GRIPPERS = ("gripper", "parallel-gripper", "width-gripper")
+GRIPPERS = [name for name in NAMES if "gripper" in name]
 
 
 @pytest.fixture(scope="module")
@@ -48,20 +50,20 @@ def rigs(tmp_path_factory):
         rigs.close()
 
 
-def in_process(names):
-    """Hands of ROS 1 run in a process of their own, which passes commands on and no reports."""
-    return [name for name in names if not name.startswith("ros1:")]
-
-
-rig = rigs_of(NAMES)
-process_rig = rigs_of(in_process(NAMES))
-finger_rig = rigs_of([name for name in NAMES if name.split(":")[-1] not in GRIPPERS])
+rig = process_rig = rigs_of(NAMES)
+finger_rig = rigs_of([name for name in NAMES if name not in GRIPPERS])
 states_rig = rigs_of(WITH_STATES)
-process_states_rig = rigs_of(in_process(WITH_STATES))
 
 
-def test_each_joint_state_is_reported_once_in_the_order_of_the_hand(process_states_rig):
-    with process_states_rig.hand as hand:
+def test_every_row_of_the_table_has_an_imitation_of_its_driver():
+    assert {open_hand(driver.uri).name.partition("?")[0] for driver in ROS2.values()} == {
+        f"ros2:{name}" for name in hand_rows()
+    }
+    assert all(row["source"] for row in hand_rows().values())
+
+
+def test_each_joint_state_is_reported_once_in_the_order_of_the_hand(states_rig):
+    with states_rig.hand as hand:
         hand.send(COMMAND)
         first = hand.joint_reports()
         assert len(first) >= 5

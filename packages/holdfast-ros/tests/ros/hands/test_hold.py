@@ -39,8 +39,7 @@ def grasp(tmp_path):
             "home: index joint 0: -0.47 to 0.47 rad expected",
         ),
         ("ros2:magic", "there are the hands ros2:plexus, ros2:v4"),
-        ("ros2:v4-envelop", "as a goal, by services, which plain DDS does not have"),
-        ("ros2:v4?order=thumb,ring,index", "order=thumb,index,middle,ring expected, in any order"),
+        ("ros2:v4?joints=thumb:a:b:c:d", "4 of thumb, 4 of index, 4 of middle, 4 of ring expect"),
     ],
 )
 def test_limits_that_the_hand_does_not_have_are_one_line(grasp, capsys, hand, message):
@@ -59,9 +58,9 @@ def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
 
 
 def test_an_armed_hand_is_confirmed_by_its_uri(grasp, capsys):
-    words = ["hold", "builtin:twin", str(grasp), "--hand", "ros1:efforts", "--armed"]
+    words = ["hold", "builtin:twin", str(grasp), "--hand", "ros2:v4", "--armed"]
     assert main([*words, "--confirm", "x"]) == 2
-    assert "confirm it with --confirm ros1:efforts" in capsys.readouterr().err
+    assert "confirm it with --confirm ros2:v4" in capsys.readouterr().err
 
 
 def test_the_table_of_fault_times_has_those_of_the_code():

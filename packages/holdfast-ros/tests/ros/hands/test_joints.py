@@ -4,30 +4,27 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from holdfast_ros.hands.joints import (
-    THUMB_FIRST,
-    THUMB_LAST,
-    V4_HIGHEST,
-    V4_LOWEST,
-    allegro_order,
-)
+from holdfast_ros.hands.joints import JointOrder
+from holdfast_ros.hands.table import hand_rows
 from holdfast_ros.topic_messages import JointStates
+
+V4 = hand_rows()["v4"]
+ORDER = JointOrder(V4["joints"])
 
 
 def test_limits_are_those_of_the_twins_hand():
     text = resources.files("holdfast.twin.tables").joinpath("allegro_right.csv").read_text()
     rows = list(csv.DictReader(line for line in text.splitlines() if line[0] != "#"))
-    order = allegro_order(THUMB_LAST, "joint_")
+    order = JointOrder(hand_rows()["v5"]["joints"])
     assert [row["joint"] for row in rows] == list(order.names)
-    np.testing.assert_allclose(order.values(V4_LOWEST), [float(row["lower"]) for row in rows])
-    np.testing.assert_allclose(order.values(V4_HIGHEST), [float(row["upper"]) for row in rows])
+    np.testing.assert_allclose(order.values(V4["lowest"]), [float(row["lower"]) for row in rows])
+    np.testing.assert_allclose(order.values(V4["highest"]), [float(row["upper"]) for row in rows])
 
 
 def test_states_are_sorted_by_name():
-    order = allegro_order(THUMB_FIRST, "ah_joint")
-    names = ("arm", *reversed(order.names))
+    names = ("arm", *reversed(ORDER.names))
     values = np.arange(17.0)
-    found = order.sort(JointStates(names, values, 10 * values))
+    found = ORDER.sort(JointStates(names, values, 10 * values))
     np.testing.assert_array_equal(found.positions, np.arange(16, 0, -1))
     np.testing.assert_array_equal(found.efforts, 10 * found.positions)
 
@@ -45,10 +42,9 @@ def test_states_are_sorted_by_name():
 )
 def test_states_of_another_hand_are_refused(states, message):
     with pytest.raises(ValueError, match=message):
-        allegro_order(THUMB_FIRST, "ah_joint").sort(states)
+        ORDER.sort(states)
 
 
 def test_a_short_list_of_names_is_no_crash():
-    order = allegro_order(THUMB_FIRST, "ah_joint")
     with pytest.raises(ValueError, match="no joint"):
-        order.sort(JointStates(order.names, np.zeros(3), np.zeros(3)))
+        ORDER.sort(JointStates(ORDER.names, np.zeros(3), np.zeros(3)))

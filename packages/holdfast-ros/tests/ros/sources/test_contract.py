@@ -30,7 +30,7 @@ pytestmark = pytest.mark.slow
 def ready(monkeypatch):
     monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
     domain = new_domain()
-    definition = known_definition("xela_server_ros2/SensStream", ros2=True)
+    definition = known_definition("xela_server_ros2/SensStream")
     node = dds.Node(domain)
     write, encode = node.writer("/xServTopic", definition), MessageEncoder(definition)
     quiet = Event()

@@ -19,7 +19,7 @@ from holdfast.io.definitions import parse_definition
 from holdfast.sensors import sensor
 from holdfast_ros import dds
 from holdfast_ros.sensor_messages import known_definition
-from holdfast_ros.sources import topic
+from holdfast_ros.sources import ros2
 from ros.domains import new_domain
 from ros_messages import PILLARS, sensor_state, store
 
@@ -95,7 +95,7 @@ def test_a_publisher_is_replaced_by_another(domain):
 def test_pillars(domain):
     types = store("sensor_interfaces", PILLARS, ros2=True)
     write = dds.Node(domain).writer(
-        "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState", ros2=True)
+        "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState")
     )
     source = open_source("ros2:///hub_0/sensor_0?fingers=1:tip")
     arrivals = fed(source, lambda k: write(pillars(types, k)))
@@ -132,7 +132,7 @@ def fed(source, write):
 
 
 def test_a_topic_without_publishers(domain, monkeypatch):
-    monkeypatch.setattr(topic, "TOPIC_OPEN_TIMEOUT", 1.0)
+    monkeypatch.setattr(ros2, "TOPIC_OPEN_TIMEOUT", 1.0)
     with pytest.raises(SourceError) as caught, open_source("ros2:///xServTopic"):
         pass
     assert str(caught.value) == (
@@ -152,9 +152,9 @@ def test_a_topic_without_publishers(domain, monkeypatch):
 
 
 def test_a_publisher_without_messages(domain, monkeypatch):
-    monkeypatch.setattr(topic, "TOPIC_OPEN_TIMEOUT", 1.0)
+    monkeypatch.setattr(ros2, "TOPIC_OPEN_TIMEOUT", 1.0)
     node = dds.Node(domain)
-    write = node.writer("/xServTopic", known_definition("xela_server_ros2/SensStream", ros2=True))
+    write = node.writer("/xServTopic", known_definition("xela_server_ros2/SensStream"))
     with pytest.raises(SourceError, match="/xServTopic has a publisher, but no samples came in"):
         open_source("ros2:///xServTopic").open()
     del write

@@ -1,5 +1,6 @@
-"""Hands of ROS 2 beyond the contract: what they need to begin, and how they notice silence."""
+"""Hands with a value for each joint: what they need to begin, and how they notice silence."""
 
+import math
 import re
 import time
 from collections import deque
@@ -15,9 +16,20 @@ from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 from holdfast_grip.loop import watchdog
 from holdfast_ros.hands import ros_hand
-from holdfast_ros.hands.joints import LIMIT_TOLERANCE
+from holdfast_ros.hands.joint_hand import LIMIT_TOLERANCE
 
-from .drivers import AH_NAMES, EFFORTS, FLOATS, PATIENCE, PLEXUS, POSITIONS, ROS2, V4, home
+from .drivers import (
+    AH_NAMES,
+    EFFORTS,
+    FLOATS,
+    PATIENCE,
+    PLEXUS,
+    POSITIONS,
+    ROS2,
+    THUMB_FIRST,
+    V4,
+    home,
+)
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
@@ -75,7 +87,7 @@ class TestBeginOfTheGrip:
         names = [name.replace("ah", "left") for name in AH_NAMES]
         with pytest.raises(HandError, match=r"no joint ah_joint00 \(there are arm_1, left_joint33"):
             self.begin(driver, names=names)
-        with open_hand("ros2:v4?prefix=left_joint") as hand:
+        with open_hand(f"ros2:v4?joints={joints_of(names, THUMB_FIRST)}") as hand:
             hand.send(COMMAND)
 
     def test_joint_states_without_names_have_the_order_of_the_commands(self, driver):
@@ -87,7 +99,7 @@ class TestBeginOfTheGrip:
     def test_another_order(self, driver):
         order = ("ring", "thumb", "index", "middle")
         peer = driver(replace(ROS2["plexus"], order=order))
-        with open_hand(f"{ROS2['plexus'].uri}&order={','.join(order)}") as hand:
+        with open_hand(f"{ROS2['plexus'].uri}&joints={joints_of(AH_NAMES, order)}") as hand:
             hand.send(COMMAND)
             assert peer.driver.meaning(peer.wait(1)) == pytest.approx(
                 {"ring": 1.0, "thumb": 1.2, "index": 1.0, "middle": 1.0}
@@ -225,6 +237,34 @@ class TestRelease:
         forces = {"thumb": 1.2, "index": 1.0, "middle": 1.0, "ring": 1.0}
         expected = "open" if on_fault == "open" else pytest.approx(forces)
         assert peer.driver.meaning(messages) == expected
+
+
+class TestUnits:
+    def test_angles_in_degrees_are_refused(self, driver, impatient):
+        driver(ROS2["v4"]).spoil(math.degrees(POSITIONS[0]), every=1)
+        with pytest.raises(HandError, match=r"joint 0 at 15.4699 rad, 0.263 to 1.396 expected"):
+            open_hand("ros2:v4").open()
+
+    def test_a_stiffness_in_degrees_is_refused_before_anything_is_sent(self, driver):
+        peer = driver(ROS2["v4"])
+        with open_hand("ros2:v4?stiffness=0.01") as hand:
+            hand.check(Limits(), ["thumb"])
+            text = r"ring joint 0: a set-point at most 0.94 rad .* check stiffness= \[N m/rad\]"
+            with pytest.raises(HandError, match=text):
+                hand.send(COMMAND)
+        assert not peer.messages
+
+    def test_torques_in_another_order_exceed_the_ceiling_of_a_joint(self):
+        torques = ["0.3"] * 16  # of the second joints; the fourth of a finger has 0.2375
+        with pytest.raises(ValueError, match=r"ring joint 3|thumb joint 2") as failure:
+            open_hand(f"ros2:v4?effort={','.join(torques)}").check(Limits(), ["thumb"])
+        assert "given at max_scale 3: lower one of them" in str(failure.value)
+
+
+def joints_of(names, order):
+    """The parameter `joints` of 16 names."""
+    parts = (names[4 * k : 4 * k + 4] for k in range(4))
+    return ",".join(":".join([finger, *part]) for finger, part in zip(order, parts, strict=True))
 
 
 def replace_state(command, state):

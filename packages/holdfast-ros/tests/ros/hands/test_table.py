@@ -1,4 +1,4 @@
-"""The URIs of hands on topics: every wrong parameter is one clear line."""
+"""The URIs of the hands of the table: every wrong parameter is one clear line."""
 
 import pytest
 
@@ -21,14 +21,8 @@ JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
             "there are the hands ros2:plexus, ros2:v4, ros2:v5, ros2:v5-envelop",
         ),
         ("ros2:///plexus", "there are the hands ros2:plexus"),
-        ("ros1:magic", "there are the hands ros1:positions, ros1:efforts, ros1:envelop, ros1:grip"),
-        ("ros2:v4-envelop", "the grasp action of V4 in ROS 2 takes its envelop effort as a goal"),
-        (
-            "ros2:v4?torque=1",
-            "unknown parameter torque; there are domain, shared, namespace",
-        ),
+        ("ros2:v4?torque=1", "unknown parameter torque; there are domain, shared, topic, type"),
         ("ros2:v4?domain=x", "a ROS domain from 0 to 232 expected, 'x' given"),
-        ("ros1:envelop?effort=1&max_effort=2&master=x", "a ROS master like http"),
         (
             "ros2:plexus?effort=1",
             "max_effort: a number or 16 numbers, one for each joint, expected, nothing",
@@ -47,7 +41,12 @@ JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
             "ros2:gripper?topic=/g&effort=4&max_effort=9&type=GripperCommand&open=0",
             "open= another position than closed= expected, 0 given",
         ),
-        ("ros2:gripper?topic=/g&effort=4&max_effort=9&closed=0", "closed= is a position of type=G"),
+        ("ros2:gripper?topic=/g&effort=4&max_effort=9&closed=0", "unknown parameter closed; there"),
+        ("ros2:gripper?topic=/g&effort=4&max_effort=9&joint=a", "unknown parameter joint; there"),
+        (
+            "ros2:v5-envelop?effort=1&max_effort=2&release=limp&home_topic=/a",
+            "parameter home_topic",
+        ),
         (
             f"ros2:v5?max_effort=1&stiffness=2&home={SIXTEEN.replace('0.1', '45')}",
             "home: index joint 0: -3.14159 to 3.14159 rad expected, 45 given",
@@ -56,13 +55,14 @@ JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
             f"ros2:v5?max_effort=1&stiffness=2&home={SIXTEEN}&highest=0.05",
             "home: index joint 0: -3.14159 to 0.05 rad expected, 0.1 given",
         ),
-        ("ros1:positions?highest=0.5", "0.5 rad expected"),
+        ("ros2:v4?highest=0.5", "0.5 rad expected"),
         ("ros2:v4?release=limp", "release=home expected, 'limp' given"),
-        ("ros2:v4?namespace=hand", "namespace=/TOPIC expected, 'hand' given"),
+        ("ros2:v4?topic=hand", "topic=/TOPIC expected, 'hand' given"),
         ("ros2:v4?states=/a b", "states=/TOPIC expected, '/a b' given"),
         ("ros2:v4?shared=yes", "shared=false or true expected, 'yes' given"),
-        ("ros2:v4?order=thumb,index", "order=thumb,index,middle,ring expected, in any order, 'thu"),
-        ("ros2:v5?max_effort=1", "stiffness: a number or 16 numbers"),
+        ("ros2:v4?joints=thumb:a", "joints: 4 of thumb, 4 of index, 4 of middle, 4 of ring expec"),
+        ("ros2:v5?max_effort=1", "home: 16 numbers, one for each joint, expected, nothing given"),
+        (f"ros2:v5?max_effort=1&home={SIXTEEN}", "stiffness: a number or 16 numbers"),
         (
             f"ros2:v5?max_effort=1&stiffness=-1&home={SIXTEEN}",
             "stiffness: numbers above 0 exp",
@@ -84,7 +84,8 @@ JOINTS = "ros2:controller?topic=/h&joints=thumb:a:b,index:c&max_effort=1"
         (f"{JOINTS}&stiffness=1,2&home=0,0,0", "stiffness: a number or 3 numbers, one for each"),
         (f"{JOINTS}&stiffness=1&home=0,0,90", "home: index joint 0: -3.14159 to 3.14159 rad expe"),
         (f"{JOINTS}&stiffness=1&home=0,0,0&lowest=4", "lowest below highest expected for each joi"),
-        (f"{JOINTS}&command=efforts&home=0,0,0", "home= is a parameter of command=positions"),
+        (f"{JOINTS}&command=efforts&home=0,0,0", "unknown parameter home; there are domain, share"),
+        (f"{JOINTS}&command=efforts&stiffness=1", "unknown parameter stiffness; there are domain"),
         (f"{JOINTS}&command=efforts&type=JointTrajectory", "type=Float64MultiArray expected, 'Jo"),
         ("ros2:controller?topic=/h", "joints=thumb:JOINT:JOINT,index:JOINT expected, each name"),
         ("ros2:controller?topic=/h&joints=thumb,index:c", "each name once, 'thumb,index:c' given"),
@@ -106,7 +107,7 @@ def test_a_wrong_uri_is_refused(uri, message):
         ),
         (
             "ros2:v5-envelop?effort=1&max_effort=1.5",
-            "an effort of at most 1.5 expected, 2 given at max_scale 2: lower one of them",
+            "at most 1.5 expected, 2 given at max_scale 2: lower one of them",
         ),
         (
             WIDTH.replace("=12", "=6"),
@@ -130,3 +131,10 @@ def test_given_efforts_are_checked_at_start_up(uri, message):
         hand.check(Limits(max_scale=2.0), ["thumb"])
     assert str(failure.value).endswith(message)
     hand.check(Limits(max_scale=1.5), ["thumb"])
+
+
+def test_a_ros_2_topic_by_its_domain(monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
+    uri = "ros2:gripper?topic=/grip&effort=1&max_effort=2"
+    assert open_hand(uri).resource == open_hand(f"{uri}&domain=7").resource
+    assert open_hand(uri).resource != open_hand(f"{uri}&domain=0").resource

@@ -1,4 +1,4 @@
-"""Grippers that take a width, and units that cannot be right."""
+"""Grippers that take a width."""
 
 import math
 
@@ -69,25 +69,3 @@ class TestWidth:
         driver(ROS2["width-gripper"]).spoil(position, every=1)
         with pytest.raises(HandError, match=r"finger_joint at \S+, 0 to 0.8 expected"):
             open_hand(self.uri).open()
-
-
-class TestUnits:
-    def test_angles_in_degrees_are_refused(self, driver, impatient):
-        driver(ROS2["v4"]).spoil(math.degrees(POSITIONS[0]), every=1)
-        with pytest.raises(HandError, match=r"joint 0 at 15.4699 rad, 0.263 to 1.396 expected"):
-            open_hand("ros2:v4").open()
-
-    def test_a_stiffness_in_degrees_is_refused_before_anything_is_sent(self, driver):
-        peer = driver(ROS2["v4"])
-        with open_hand("ros2:v4?stiffness=0.01") as hand:
-            hand.check(Limits(), ["thumb"])
-            text = r"ring joint 0: a set-point at most 0.94 rad .* check stiffness= \[N m/rad\]"
-            with pytest.raises(HandError, match=text):
-                hand.send(COMMAND)
-        assert not peer.messages
-
-    def test_torques_in_another_order_exceed_the_ceiling_of_a_joint(self):
-        torques = ["0.3"] * 16  # of the second joints; the fourth of a finger has 0.2375
-        with pytest.raises(ValueError, match=r"ring joint 3|thumb joint 2") as failure:
-            open_hand(f"ros2:v4?effort={','.join(torques)}").check(Limits(), ["thumb"])
-        assert "given at max_scale 3: lower one of them" in str(failure.value)

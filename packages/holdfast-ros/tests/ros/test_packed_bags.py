@@ -7,7 +7,6 @@ pytest.importorskip("rosbags", reason="rosbags is not installed")
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from holdfast.errors import RecordingError
 from holdfast_ros.bags import open_bag
 
 N = 300
@@ -60,32 +59,3 @@ def test_ros1(tmp_path, kind):
         writer.set_compression(kind)
     write(writer, msgdef=DEFINITION, md5sum="0" * 32)
     assert found(path) == EXPECTED
-
-
-def test_a_file_that_is_named_twice(tmp_path):
-    path = tmp_path / "bag"
-    write(Writer(path, version=9), msgdef=DEFINITION, rihs01=f"RIHS01_{0:064x}")
-    metadata = path / "metadata.yaml"
-    (file,) = [one.name for one in path.iterdir() if one != metadata]
-    metadata.write_text(metadata.read_text().replace(f"- {file}", f"- {file}\n  - {file}", 1))
-    with pytest.raises(RecordingError, match=r"metadata\.yaml names a file twice"), open_bag(path):
-        pass
-
-
-@pytest.mark.parametrize("size", [200, 6000])
-def test_a_database_that_is_cut_inside_a_page_or_a_message_gives_whole_messages(tmp_path, size):
-    path = tmp_path / "bag"
-    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as writer:
-        topic = writer.add_connection("/a", KIND, msgdef=DEFINITION, rihs01=f"RIHS01_{0:064x}")
-        for k in range(8000 // size + 20):
-            writer.write(topic, 1000 * k, f"{k:04}".encode() * (size // 4))
-    (file,) = path.glob("*.db3")
-    data, n_found = file.read_bytes(), set()
-    for n_bytes in range(max(len(data) // 2, 30_000), len(data), 1100):
-        file.write_bytes(data[:n_bytes])
-        with open_bag(file) as bag:
-            assert not bag.complete
-            messages = [message for _, _, message in bag.messages(bag.topics)]
-        assert all(message == message[:4] * (size // 4) for message in messages)
-        n_found.add(len(messages))
-    assert max(n_found) > min(n_found)
