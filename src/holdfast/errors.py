@@ -59,27 +59,14 @@ LABORATORY = "holdfast-lab"
 PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "holdfast-grip": {
         "verbs": ("hold",),
-        "panels": ("grip",),
         "groups": ("hands", "laws"),
-        "options": (
-            "serve --hand",
-            "serve --law",
-            "serve --armed",
-            "serve --confirm",
-            "serve --max-scale",
-            "serve --min-scale",
-            "serve --max-force",
-            "serve --on-fault",
-            "serve --newtons",
-        ),
     },
     "holdfast-ros": {
         "sources": ("ros1", "ros2"),
         "importers": ("rosbag",),
         "publishers": ("ros1", "ros2"),
         "hands": ("ros1", "ros2"),
-        "players": ("driven",),
-        "options": ("serve --ros2", "serve --ros1", "play --hand"),
+        "options": ("serve --ros2", "serve --ros1"),
     },
     LABORATORY: {
         "verbs": ("bench", "study", "trial"),

@@ -5,7 +5,33 @@ LAST_COMMIT = "f7d623e5"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {},
-    "options": {},
+    "options": {
+        **dict.fromkeys(
+            (
+                "serve --hand",
+                "serve --law",
+                "serve --armed",
+                "serve --confirm",
+                "serve --max-scale",
+                "serve --min-scale",
+                "serve --max-force",
+                "serve --on-fault",
+                "serve --newtons",
+            ),
+            "`holdfast hold MODEL SOURCE --hand URI` in a terminal",
+        ),
+        "play --hand": "`holdfast hold twin:?object=can --hand twin:` commands the twin itself",
+        **dict.fromkeys(
+            (
+                "teach --page",
+                "teach --host",
+                "teach --port",
+                "teach --token",
+                "teach --token-file",
+            ),
+            "`holdfast teach SOURCE -o NAME.json` in a terminal",
+        ),
+    },
     "sources": {},
     "importers": {},
     "exporters": {},

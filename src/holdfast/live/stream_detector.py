@@ -83,7 +83,7 @@ class StreamDetector:
 
     Attributes:
         source: the source.
-        model: the model that decides now; change it by `set_model`.
+        model: the model.
         fingers: sensor of each finger that the model uses.
         thresholds: probability from which each finger is stable; change it by `set_threshold`.
         rate: measured rate of the source [Hz]; NaN during the first half second.
@@ -254,19 +254,6 @@ class StreamDetector:
         if self._detector is not None:
             self._detector.set_thresholds(thresholds)
         self.thresholds = thresholds
-
-    def set_model(self, model: Model) -> None:
-        """Change the model to one of the same features, such as the model with own handling.
-
-        States and filters continue: nothing warms up again. The thresholds are those of the model.
-
-        Raises:
-            ModelError: it has other features or another debouncing; nothing has changed then.
-        """
-        if self._detector is not None:
-            self._detector.set_model(model)
-        self.model = model
-        self.set_threshold(None)
 
     def restart_tare(self) -> None:
         """Discard the tare, and take a new one from the next samples.
