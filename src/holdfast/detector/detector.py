@@ -217,11 +217,6 @@ class Detector:
         self._kernel.set_rules(*rules)
         self._rules = rules
 
-    @property
-    def knows_zero(self) -> bool:
-        """Whether the readings without contact are known, if the first samples were load."""
-        return not self._stream.plan.zero_unknown
-
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.
 

@@ -2,8 +2,7 @@
 
 import math
 import time
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 from holdfast.errors import SourceError
 from holdfast.live.recording_buffer import ModuleBuffer
@@ -31,7 +30,6 @@ class HandlingBuffer:
     def __init__(self, stream: StreamDetector) -> None:
         self._stream = stream
         self._modules = {name: ModuleBuffer(one) for name, one in stream.fingers.items()}
-        self._metadata: Mapping[str, Any] | None = None  # of the start: the zero of the stream
         # Held time of each finger, and the time of its last estimate; `put` changes both.
         self._held = dict.fromkeys(stream.fingers, 0.0)
         self._last = dict.fromkeys(stream.fingers, math.nan)
@@ -50,8 +48,6 @@ class HandlingBuffer:
 
     def put(self, update: StreamUpdate) -> None:
         """Append an update."""
-        if self._metadata is None:
-            self._metadata = self._stream.start_metadata()
         arrival = update.arrival
         if arrival is not None:
             for name, buffer in self._modules.items():
@@ -68,7 +64,7 @@ class HandlingBuffer:
                     self._held[name] += step
 
     def recording(self) -> Recording:
-        """Return the samples as a recording that begins as the stream was then.
+        """Return the samples as a recording that begins as the stream.
 
         Raises:
             RecordingError: there are none.
@@ -77,10 +73,9 @@ class HandlingBuffer:
         for name, buffer in self._modules.items():
             times, readings = buffer.pop_samples()
             if len(times):
-                kept = self._stream.without_ignored(name, readings)
-                modules[name] = Tactile(self._stream.fingers[name], times, kept)
+                modules[name] = Tactile(self._stream.fingers[name], times, readings)
         name = time.strftime("handling-%Y%m%d-%H%M%S")
-        return Recording(name, modules, metadata=dict(self._metadata or {}))
+        return Recording(name, modules, metadata=self._stream.start_metadata())
 
 
 def record_handling(
