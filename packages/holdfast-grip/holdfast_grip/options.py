@@ -1,4 +1,4 @@
-"""Options of the verbs that control a hand, and the loop that they describe."""
+"""Options of the verb hold, and the loop that they describe."""
 
 import sys
 from collections.abc import Iterator
