@@ -15,8 +15,6 @@ from holdfast import children
 from holdfast.cli import main
 from holdfast.cli.extensions import (
     EXPORTER_PLUGINS,
-    PANEL_PLUGINS,
-    PLAYER_PLUGINS,
     PLUGIN_GROUPS,
     PUBLISHER_PLUGINS,
     SIMULATOR_PLUGINS,
@@ -174,10 +172,7 @@ def test_formats_of_packages_that_are_not_installed_are_named(tmp_path, monkeypa
         import_recordings(tmp_path, "far")
 
 
-VERB_OF_KIND = {
-    "exporters": "export", "simulators": "simulate", "publishers": "serve", "panels": "serve",
-    "players": "play",
-}  # fmt: skip
+VERB_OF_KIND = {"exporters": "export", "simulators": "simulate", "publishers": "serve"}
 """The verb that gets the options of a kind of plug-ins."""
 PACKAGES = ["holdfast-lab", *sorted(path.name for path in TEMPLATE.parents[1].glob("packages/*"))]
 """Distributions beside the core."""
@@ -282,9 +277,10 @@ def test_a_verb_that_cannot_be_used_is_one_line(parts, capsys, caplog):
 
 
 EXTENSIONS = (
-    (PUBLISHER_PLUGINS, "publisher"), (PANEL_PLUGINS, "panel"), (PLAYER_PLUGINS, "source"),
-    (EXPORTER_PLUGINS, "export"), (SIMULATOR_PLUGINS, "simulate"),
-)  # fmt: skip
+    (PUBLISHER_PLUGINS, "publisher"),
+    (EXPORTER_PLUGINS, "export"),
+    (SIMULATOR_PLUGINS, "simulate"),
+)
 
 
 @pytest.mark.parametrize(("group", "function"), EXTENSIONS, ids=[f for _, f in EXTENSIONS])

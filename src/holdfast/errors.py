@@ -57,18 +57,6 @@ LABORATORY = "holdfast-lab"
 PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "holdfast-grip": {
         "verbs": ("hold",),
-        "panels": ("grip",),
-        "options": (
-            "serve --hand",
-            "serve --law",
-            "serve --armed",
-            "serve --confirm",
-            "serve --max-scale",
-            "serve --min-scale",
-            "serve --max-force",
-            "serve --on-fault",
-            "serve --newtons",
-        ),
     },
     "holdfast-ros": {
         "sources": ("ros2",),

@@ -39,6 +39,24 @@ REMOVED: dict[str, dict[str, str]] = {
         "datasets --yes": "leave it out, no set is larger than 26 MB",
         "--config": WRITTEN_OUT,
         "play --hand": "holdfast hold twin:?object=can --hand twin:",
+        **dict.fromkeys(
+            (
+                "serve --hand",
+                "serve --law",
+                "serve --armed",
+                "serve --confirm",
+                "serve --max-scale",
+                "serve --min-scale",
+                "serve --max-force",
+                "serve --on-fault",
+                "serve --newtons",
+            ),
+            "holdfast hold MODEL SOURCE --hand URI in a terminal",
+        ),
+        **dict.fromkeys(
+            ("teach --page", "teach --host", "teach --port", "teach --token", "teach --token-file"),
+            "holdfast teach SOURCE -o NAME.json in a terminal",
+        ),
         "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {

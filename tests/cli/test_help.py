@@ -14,7 +14,7 @@ SHOWN = {
     "play": "--host --port --speed --once --json",
     "import": "--format --sensor --columns --no-labels --suffix --jobs --force --json",
     "label": "--tare --poses --track --author --browser --json",
-    "teach": "--output --from --camera --to --resume --unattended --page --model --false-alarms "
+    "teach": "--output --from --camera --to --resume --unattended --model --false-alarms "
     "--jobs --force --in-contact --json",
     "train": "--output --classifier --features --split --trials --own-slip-features --init --for "
     "--jobs --force --in-contact --json",

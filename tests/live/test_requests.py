@@ -20,14 +20,6 @@ def test_requests_are_carried_out_in_order_and_once():
     assert [result.result(0) for result in results] == [None] * 3
 
 
-def test_results_are_set_after_the_follow_up():
-    requests, states = RequestQueue(), []
-    result = requests.append(lambda: states.append("work"))
-    requests.carry_out(lambda: states.append(result.done()))
-    assert states == ["work", False]
-    assert result.done()
-
-
 def test_a_request_that_fails_has_its_exception_and_the_others_go_on():
     requests, calls = RequestQueue(), []
     failing, other = requests.append(fail), requests.append(lambda: calls.append(1))
@@ -35,15 +27,6 @@ def test_a_request_that_fails_has_its_exception_and_the_others_go_on():
     with pytest.raises(ValueError, match=r"^no$"):
         failing.result(0)
     assert (calls, other.result(0)) == ([1], None)
-
-
-def test_a_follow_up_that_fails_fails_all_requests_and_is_raised():
-    requests = RequestQueue()
-    result = requests.append(lambda: None)
-    with pytest.raises(ValueError, match=r"^no$"):
-        requests.carry_out(fail)
-    with pytest.raises(ValueError, match=r"^no$"):
-        result.result(0)
 
 
 def test_a_cancelled_request_is_not_carried_out():
@@ -54,14 +37,6 @@ def test_a_cancelled_request_is_not_carried_out():
     assert calls == []
     with pytest.raises(CancelledError):
         result.result(0)
-
-
-def test_a_request_that_cannot_be_cancelled_is_carried_out():
-    requests, calls = RequestQueue(), []
-    result = requests.append(lambda: calls.append(1), cancellable=False)
-    assert not result.cancel()
-    requests.carry_out()
-    assert (calls, result.result(0)) == ([1], None)
 
 
 def test_a_request_of_a_request_waits_for_the_next_time():

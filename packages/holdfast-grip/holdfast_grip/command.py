@@ -10,7 +10,7 @@ import msgspec
 class LoopState(StrEnum):
     """State of the loop.
 
-    IDLE: no grip yet, or stopped. HOLD: the force does not change. REACT: the force rises.
+    IDLE: no grip yet. HOLD: the force does not change. REACT: the force rises.
     RELAX: the force falls. FAULT: the hand holds its last command or opens, see `Limits`.
     """
 
@@ -47,7 +47,6 @@ class GripReason(StrEnum):
     OVERLOAD = "overload"
     LIMIT = "limit"
     WATCHDOG = "watchdog"
-    STOPPED = "stopped"
 
 
 class FingerCommand(msgspec.Struct, frozen=True, gc=False):

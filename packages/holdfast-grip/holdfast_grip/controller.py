@@ -12,7 +12,6 @@ from holdfast_grip.laws import Law, Touch, law_named
 from holdfast_grip.laws.base import Three
 from holdfast_grip.limits import Limits
 from holdfast_grip.repeats import RepeatMonitor
-from holdfast_grip.waiting import GripWait
 
 MAX_EVENTS = 1000
 """Number of events that a controller keeps until `events` is called; the oldest are dropped."""
@@ -31,8 +30,6 @@ DETECTOR_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
 MIN_FINGERS = 2
 """Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
-LASTING_FAULTS = (GripReason.LOST, GripReason.STOPPED)
-"""Faults that only a reset ends; they replace the reason of one that ends by itself."""
 MIN_OPENING = 0.1
 """Share of the way that the joints closed, by which they went back when the object is let go."""
 MIN_CLOSING = 0.05
@@ -123,13 +120,11 @@ class GripController:
         ceiling = math.inf if limits.max_force is None else limits.max_force
         self._ceiling = OVERLOAD * ceiling
         self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
-        self._waiting = GripWait(MIN_FINGERS)
         self.reset()
 
     def reset(self) -> None:
         """Return to IDLE: forget the grip and its faults."""
         self.state = LoopState.IDLE
-        self._waiting.reset()
         # Fingers of the grip, set by `_begin`; empty without a grip.
         self._touches: list[Touch] = []
         # Joint angles: the first ones, those when the grip began, and the newest; None without.
@@ -141,67 +136,28 @@ class GripController:
         # Highest scale of each finger, from its force when the grip began.
         self._highest: list[float] = []
         self._commands: dict[str, FingerCommand] = {}
-        # A latched fault and a stop end by `resume` or `reset` only.
-        self._latched = self._stopped = False
+        # A latched fault ends by `reset` only.
+        self._latched = False
         # UNKNOWN never lowers a force: forces fall only while this is True.
         self._all_known = False
         # Those of `_monitors` in the grip; `reset` keeps the noise that these have measured.
         self._repeats: list[RepeatMonitor] = []
         # Times of the last update that counted and of its estimate; NaN before the first.
         self._time = self._estimated_at = math.nan
-        self._shift = 0.0  # of the law's clock, which continues where that of the source jumped
-        # Set by `resume`: the next update may have any time.
-        self._clock_is_new = False
         # NaN is in no order with a time, so what has not begun never lasts long enough.
         self._stable_since = self._calm_since = self._steady_since = math.nan
         # Sums of normal and tangential forces at the begin of a steady grip.
         self._steady_forces = math.nan, math.nan
         self._valid_since = math.nan
-        # On the law's clock, so that a cooldown goes on over a jump of the source's.
         self._raised_at = -math.inf
         # The present fault, and that of `report`, which the next update takes.
         self._fault = self._reported = GripReason.NONE
         self._events: deque[GripEvent] = deque(maxlen=MAX_EVENTS)
 
-    def stop(self) -> None:
-        """Stop: from the next update on, in FAULT (stopped) until `resume` or `reset`."""
-        if not self._stopped:
-            self._stopped, self._fault = True, _NONE
-
-    def resume(self) -> None:
-        """End a stop or a fault, by the decision of a person. It has no effect elsewhere.
-
-        A grip that still touches the object goes on with its scales. After "open", or without
-        contact, the controller returns to IDLE, as by `reset`. The time of the next update may be
-        any: that is how a clock that has jumped is accepted.
-        """
-        self._clock_is_new = True
-        if not self._stopped and self._fault is _NONE:
-            return
-        touching = any(touch.touching for touch in self._touches)
-        if self.limits.on_fault == "open" or not touching:
-            self.reset()
-            return
-        self._latched = self._stopped = False
-        self._fault = _NONE
-        # What was bad before does not count again at once.
-        self._bad_since = [math.inf] * len(self._bad_since)
-        self._change(_HOLD, self._time)
-
     @property
     def loaded_fingers(self) -> tuple[str, ...]:
         """Fingers of the grip; none while IDLE."""
         return tuple(touch.finger for touch in self._touches)
-
-    @property
-    def highest_scales(self) -> dict[str, float]:
-        """Highest scale that each finger of the grip may get; none while IDLE."""
-        return dict(zip(self.loaded_fingers, self._highest, strict=False))
-
-    @property
-    def waits_for(self) -> str:
-        """What the hand lacks before the grip begins, in words; empty from when it has begun."""
-        return self._waiting.text if self.state is LoopState.IDLE else ""
 
     def events(self) -> list[GripEvent]:
         """Return states and rises since the last call, at most `MAX_EVENTS`, oldest first."""
@@ -250,18 +206,7 @@ class GripController:
             for name, finger in fingers.items():
                 self._monitors[name].update(finger)
         fault, self._reported = self._reported, _NONE
-        if self._clock_is_new and math.isfinite(time):
-            # Continue at another time; that of the law goes on as if none had passed.
-            self._clock_is_new = False
-            if not math.isnan(self._time):
-                self._shift += self._time - time
-                self._time = time
         dt = time - self._time
-        if self._stopped:
-            # Hold or open, and follow the contacts of the grip, if there is one.
-            if self._touches:
-                self._problem(estimate, time, dt)
-            return self._in_fault(GripReason.STOPPED, time)
         if self.state is LoopState.IDLE:
             return self._idle(estimate, time)
         problem = self._problem(estimate, time, dt)
@@ -285,7 +230,6 @@ class GripController:
 
     def _idle(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
-        self._waiting.update(estimate, time)
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
         is_stable = estimate.state is ContactState.STABLE
@@ -427,9 +371,10 @@ class GripController:
             self._time = time
         if problem is not GripReason.NONE:
             self._valid_since = math.nan
-            lasting = problem in LASTING_FAULTS
+            # Only a loss lasts until a reset, and replaces the reason of what would end by itself.
+            lasting = problem is GripReason.LOST
             # The first fault stays the reason, unless one that lasts follows it.
-            if self._fault is GripReason.NONE or (lasting and self._fault not in LASTING_FAULTS):
+            if self._fault is GripReason.NONE or (lasting and self._fault is not problem):
                 self._fault = problem
                 self._change(LoopState.FAULT, time, problem)
             self._latched |= self.limits.on_fault == "open" or lasting
@@ -449,12 +394,11 @@ class GripController:
     def _control(self, time: float, dt: float) -> GripCommand:
         """Apply the law within the limits."""
         limits, commands, highest = self.limits, self._commands, self._highest
-        clock = time + self._shift
-        wishes = self.law.wishes(self._touches, clock, dt)
+        wishes = self.law.wishes(self._touches, time, dt)
         if len(wishes) != len(self._touches):
             raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
         # A rise shakes the contacts, and an UNKNOWN finger may slip: nothing falls then.
-        may_fall = self._all_known and clock - self._raised_at >= limits.cooldown
+        may_fall = self._all_known and time - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):
             scale = touch.scale
@@ -471,7 +415,7 @@ class GripController:
             elif commands[touch.finger].reason is not _NONE:
                 commands[touch.finger] = FingerCommand(scale)
         if rising:
-            self._raised_at = clock
+            self._raised_at = time
         state = _REACT if rising else _RELAX if falling else _HOLD
         if state is not self.state:
             self._change(state, time)

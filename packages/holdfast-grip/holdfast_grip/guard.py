@@ -11,14 +11,13 @@ class CommandGuard:
     """Check of commands against the limits, and limit of their rate.
 
     A command beyond the limits is replaced by the safe command: the last good scales, or
-    release. From then on every command is, until `reset`.
+    release. From then on every command is.
 
     Args:
         limits: the same as those of the controller.
 
     Attributes:
         violation: what the first refused command violated; empty if none was.
-        stopped: whether every command is replaced by the safe one, because of `stop`.
 
     Example:
         >>> guard = CommandGuard(Limits(max_scale=2.0))
@@ -29,28 +28,11 @@ class CommandGuard:
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget all commands."""
-        self.resume()
+        self.violation = ""
         self._scales: dict[str, float] = {}
-        self._checked_at = -math.inf
+        self._checked_at = self._sent_at = self._sent_at_clock = -math.inf
         # State and reason sent last; only a new FAULT is never held back.
         self._sent = LoopState.IDLE, GripReason.NONE
-
-    def stop(self) -> None:
-        """Replace every command by the safe one from now on, until `resume` or `reset`."""
-        self.stopped = True
-
-    def resume(self) -> None:
-        """End a stop or a violation; the last scales stay those from which a rise is measured.
-
-        The next command is not held back, must not rise, and may have any time.
-        """
-        self.violation, self.stopped = "", False
-        self._checked_at = -math.inf
-        self._sent_at = self._sent_at_clock = -math.inf
 
     def admit(self, command: GripCommand, clock: float = math.nan) -> GripCommand | None:
         """Return the command to send.
@@ -82,13 +64,12 @@ class CommandGuard:
         """Return a command that is not sent, or the safe command in its place."""
         # The first violation stays: later ones may only follow from it.
         self.violation = self.violation or self._violation(command)
-        if self.stopped or self.violation:
+        if self.violation:
             # Before the first good command the hand has its own force, a scale of 1.
             names: Mapping[str, object] = self._scales or command.fingers
             fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
             release = self.limits.on_fault == "open"
-            reason = GripReason.STOPPED if self.stopped else GripReason.LIMIT
-            command = GripCommand(command.time, LoopState.FAULT, fingers, release, reason)
+            command = GripCommand(command.time, LoopState.FAULT, fingers, release, GripReason.LIMIT)
         self._scales = {name: one.scale for name, one in command.fingers.items()}
         if math.isfinite(command.time):
             # Never back: the time until the next command would allow a larger rise.
@@ -98,7 +79,7 @@ class CommandGuard:
     def _violation(self, command: GripCommand) -> str:
         limits = self.limits
         elapsed = command.time - self._checked_at
-        # After a reset, or at a time of NaN, no rise is allowed.
+        # At a time of NaN no rise is allowed.
         elapsed = max(elapsed, 0.0) if math.isfinite(elapsed) else 0.0
         for name, one in command.fingers.items():
             if not limits.min_scale - SLACK <= one.scale <= limits.max_scale + SLACK:

@@ -13,7 +13,7 @@ SLACK = 1e-9
 class Limits(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Limits of a grip controller. A scale is a multiple of the force at the start of the grip.
 
-    The defaults are those of `holdfast hold`, `serve --hand` and `trial`
+    The defaults are those of `holdfast hold` and `trial`
     (`docs/decisions/0013-one-set-of-grip-limits.md`).
 
     Attributes:

@@ -1,4 +1,4 @@
-"""Options of the verbs that control a hand, and the loop that they describe."""
+"""Options of the verb hold, and the loop that they describe."""
 
 import sys
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ class GripSettings:
     """Group of options: control of the grip force of a hand.
 
     Attributes:
-        hand: URI of the hand; empty if none is controlled.
+        hand: URI of the hand.
         max_scale: highest force scale; None for the default of `Limits`.
         min_scale: lowest force scale; None for the default of `Limits`.
     """
@@ -81,15 +81,12 @@ class GripSettings:
         """Check the values before anything is opened.
 
         Raises:
-            ValueError: the limits contradict each other, there is no such law, or there are
-                values without a hand.
+            ValueError: the limits contradict each other, or there is no such law.
         """
         from holdfast_grip.laws import law_named
 
         self.limits()
         law_named(self.law)
-        if not self.hand and self != NO_HAND:
-            raise ValueError("--armed, --law and the limits are for a hand: give --hand URI too")
 
     def limits(self) -> "Limits":
         """Return the limits of the controller.
@@ -104,12 +101,7 @@ class GripSettings:
         return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **wanted)
 
 
-NO_HAND = GripSettings(hand="")
-
-
-def find_source_and_hand(
-    source: str, hand: str, *, speed: float, loop: bool = False
-) -> "tuple[Source, HandDevice]":
+def find_source_and_hand(source: str, hand: str, *, speed: float) -> "tuple[Source, HandDevice]":
     """Return source and hand, which are not open yet: the same object if both are the twin.
 
     Raises:
@@ -125,9 +117,9 @@ def find_source_and_hand(
         require_extras("twin")
         from holdfast_grip.hands.live_twin import LiveTwin
 
-        twin = LiveTwin(source, speed=speed, loop=loop)
+        twin = LiveTwin(source, speed=speed)
         return twin, twin
-    return open_source(source, speed=speed, loop=loop), open_hand(hand)
+    return open_source(source, speed=speed), open_hand(hand)
 
 
 def check_armed(settings: GripSettings) -> None:

@@ -1,6 +1,5 @@
 """Formats of other tools for `holdfast export`, and the view of `holdfast serve --rerun`."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -96,9 +95,7 @@ class LiveRerun:
     OPTIONS = LiveOptions()
 
     @staticmethod
-    def publisher(
-        stream: "StreamDetector", panels: Mapping[str, Any], options: LiveOptions
-    ) -> "RerunPublisher":
+    def publisher(stream: "StreamDetector", options: LiveOptions) -> "RerunPublisher":
         """Return the publisher of a stream; it is not open yet."""
         require_rerun()
         from holdfast_interop.rerun.publisher import RerunPublisher

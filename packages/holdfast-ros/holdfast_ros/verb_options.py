@@ -1,8 +1,7 @@
 """Option that the package adds to a verb: `serve --ros2`."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -24,9 +23,7 @@ class Ros2:
     OPTIONS = Ros2Options()
 
     @staticmethod
-    def publisher(
-        stream: "StreamDetector", panels: Mapping[str, Any], options: Ros2Options
-    ) -> "Ros2Publisher":
+    def publisher(stream: "StreamDetector", options: Ros2Options) -> "Ros2Publisher":
         """Return the publisher of a stream; it is not open yet."""
         from holdfast_ros.dds import Link
         from holdfast_ros.publisher import Ros2Publisher

@@ -1,4 +1,4 @@
-"""What plug-ins add to verbs: formats of `export`, publishers and panels of `serve`, and others.
+"""What plug-ins add to verbs: formats of `export`, publishers of `serve`, and simulators.
 
 Such a plug-in is an object with `OPTIONS`, an instance of a frozen dataclass: its fields are the
 options that the verb gets, with their defaults, and the plug-in is used if one of them differs.
@@ -71,10 +71,6 @@ EXPORTER_PLUGINS = PluginGroup("exporters", ("csv",), _extension("export"))
 """Formats of `holdfast export RECORDINGS`."""
 PUBLISHER_PLUGINS = PluginGroup("publishers", (), _extension("publisher"))
 """What `holdfast serve` also publishes to."""
-PANEL_PLUGINS = PluginGroup("panels", (), _extension("panel"))
-"""Panels of the live page."""
-PLAYER_PLUGINS = PluginGroup("players", (), _extension("source"))
-"""Sources of `holdfast play` that react to other programs."""
 SIMULATOR_PLUGINS = PluginGroup("simulators", (), _extension("simulate"))
 """What `holdfast simulate` simulates besides the grasps of an Allegro hand."""
 
@@ -89,18 +85,6 @@ class PublisherOptions(PluginOptions):
     """Options of publishers."""
 
     group = PUBLISHER_PLUGINS
-
-
-class PanelOptions(PluginOptions):
-    """Options of panels of the live page."""
-
-    group = PANEL_PLUGINS
-
-
-class PlayerOptions(PluginOptions):
-    """Options of players."""
-
-    group = PLAYER_PLUGINS
 
 
 class SimulatorOptions(PluginOptions):

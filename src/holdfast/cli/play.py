@@ -2,11 +2,10 @@
 
 import sys
 from contextlib import ExitStack, suppress
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-from holdfast.cli.extensions import PlayerOptions
 from holdfast.cli.options import (
     LOCALHOST,
     RARE,
@@ -22,9 +21,6 @@ from holdfast.cli.terminal.console import message_if_slow, print_json, print_mes
 from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.cli.terminal.progress import show_clients
 from holdfast.errors import require_extras
-
-if TYPE_CHECKING:
-    from holdfast.devices.sources import Source
 
 
 def play(
@@ -47,7 +43,6 @@ def play(
         ),
         RARE,
     ] = None,
-    players: Annotated[PlayerOptions, RARE],
     as_json: JsonOption = False,
 ) -> None:
     r"""Send a recording or the twin as a XELA server does.
@@ -74,8 +69,6 @@ def play(
         raise ValueError(f"--speed: a speed above 0 expected, {speed:g} given")
     if source.startswith("twin:"):
         require_extras("twin", "parquet")
-    chosen = players.chosen()  # its source plays once
-    once = once or bool(chosen)
     with ExitStack() as stack:
         # The imports are inside: they are part of the wait.
         with message_if_slow(awaited(source)):
@@ -83,11 +76,7 @@ def play(
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
             from holdfast.live.publishers.xela_server import XelaServer
 
-            if chosen:
-                _, player, values = chosen[0]
-                opened: Source = stack.enter_context(player.source(source, values, speed=speed))
-            else:
-                opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
+            opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
         whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
         server = XelaServer(
             opened, version=version, host=host, port=port, whole_hand=whole,

@@ -7,10 +7,9 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.extensions import PanelOptions, PublisherOptions
+from holdfast.cli.extensions import PublisherOptions
 from holdfast.cli.options import (
     LOCALHOST,
-    RARE,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -40,7 +39,6 @@ def serve(
     once: OnceOption = False,
     options: DetectorOptions,
     start: StartOptions,
-    panels: Annotated[PanelOptions, RARE],
     publishers: PublisherOptions,
     as_json: JsonOption = False,
 ) -> None:
@@ -50,10 +48,6 @@ def serve(
     can also take the tare and record. Other programs read the WebSocket /api/v1/estimates (every
     sample) or /api/v1/live (twenty times per second), see docs/live-page.md. Without --host, only
     this machine can connect. With --json, the address is printed as JSON. Stop it with Ctrl-C.
-
-    With --hand, it also controls the grip force of a hand, as holdfast hold does, and the page
-    has an emergency stop. Without --armed nothing is sent. Read docs/grip.md first; --help-all has
-    the options.
 
     SOURCE is the path of a recording, xela://HOST:PORT (or xela://auto), twin:?object=can,
     ros2:///xServTopic or serial:///dev/ttyACM0?sensor=anyskin.
@@ -67,22 +61,13 @@ def serve(
     from holdfast.devices.sources import open_source
     from holdfast.live.session import Session, publishing
 
-    openers = [
-        plugin.panel(chosen, source, speed=speed, loop=not once)
-        for _, plugin, chosen in panels.chosen()
-    ]
     token = access.find_token()  # a wrong token is refused before anything is loaded
     check_speed(source, speed)
     with message_if_slow(f"loading the detector for {source}" if awaited(source) else ""):
         loaded = options.load_model(model)
 
-    # A panel may make the source, as the twin whose hand it commands.
-    made = [opener.source() for opener in openers]
-    own = next((one for one in made if one is not None), None)
-    unopened = own or open_source(source, speed=speed, loop=not once)
+    unopened = open_source(source, speed=speed, loop=not once)
     with ExitStack() as stack:
-        for opener in openers:
-            opener.connect(stack)  # before the source is open: its samples wait for nothing
         with message_if_slow(awaited(unopened.name)):
             stack.enter_context(unopened)
         # The server takes longest to import: a source that is not there is refused before it.
@@ -103,14 +88,11 @@ def serve(
             )
 
         session = stack.enter_context(Session(options.create_stream(loaded, unopened, start)))
-        panel_list = [stack.enter_context(opener.open(session)) for opener in openers]
-        shown = {panel.name: panel for panel in panel_list}
         sinks = [
-            plugin.publisher(session.stream, shown, chosen)
-            for _, plugin, chosen in publishers.chosen()
+            plugin.publisher(session.stream, chosen) for _, plugin, chosen in publishers.chosen()
         ]
         stack.enter_context(publishing(session, sinks, print_message))
         run_page(
             session, announce, host=access.host, port=access.port, guard=guard, folder=record_to,
-            report=print_message, panels=panel_list, stay=not once,
+            report=print_message, stay=not once,
         )  # fmt: skip

@@ -133,8 +133,8 @@ class Detector:
 
     def _start(self, model: Model, stream: FeatureStream) -> None:
         plan = stream.plan
-        # What holds for the life of the detector; only `set_model` and `set_thresholds` replace
-        # parts and rules. `_readings` and `_present` are memory for samples of other types.
+        # What holds for the life of the detector; only `set_thresholds` replaces the rules.
+        # `_readings` and `_present` are memory for samples of other types.
         self._names = (*plan.fingers, HAND)
         self._settings = tables.model_table(model, plan)
         self._parts = [model.finger(*finger) for finger in plan.sensors.items()]
@@ -214,42 +214,6 @@ class Detector:
             tables.stable_head(rules, self._slots[finger][0])["threshold"] = threshold
         self._kernel.set_rules(*rules)
         self._rules = rules
-
-    @property
-    def knows_zero(self) -> bool:
-        """Whether the readings without contact are known, if the first samples were load."""
-        return not self._stream.plan.zero_unknown
-
-    def set_model(self, model: Model) -> None:
-        """Change weights and thresholds to those of another model, from the next sample on.
-
-        Features, states and filters continue: nothing warms up again. `reset` keeps the model.
-
-        Args:
-            model: of the same features and the same debouncing, such as the model of the detector
-                with own handling.
-
-        Raises:
-            ModelError: the model has other features or another debouncing; nothing has changed
-                then.
-        """
-        plan = self._stream.plan
-        # The features first: rules over other features cannot be compared.
-        features = {name: model.finger(name).features for name in plan.sensors}
-        parts = [model.finger(*finger) for finger in plan.sensors.items()]
-        if features != dict(plan.features):
-            raise ModelError(
-                f"{model.name or 'the model'} has other features than the model of the detector; "
-                "open the source again with it"
-            )
-        settings, rules = tables.model_table(model, plan), tables.rules_of(model, plan)
-        if settings != self._settings or tables.shapes(rules) != tables.shapes(self._rules):
-            raise ModelError(
-                f"{model.name or 'the model'} decides by another rule than the model of the "
-                "detector; open the source again with it"
-            )
-        self._kernel.set_rules(*rules)
-        self._parts, self._rules = parts, rules
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
         """Process one sample of some or all fingers.

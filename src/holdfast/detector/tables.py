@@ -70,11 +70,6 @@ def stable_head(rules: Rules, finger: int) -> Struct:
     return rules[1][finger * len(HEAD_NAMES) + HEAD_NAMES.index("stable")]
 
 
-def shapes(rules: Rules) -> list[tuple[object, ...]]:
-    """Return what another model must have, so that a detector continues with its weights."""
-    return [(head["n_outputs"], head["has_squares"], head["causes"]) for head in rules[1]]
-
-
 def _contact(part: FingerModel) -> Struct:
     # In this order: a model of relative features has a limit by load; and a limit in the unit of
     # the readings, which was measured, is better than a multiple of the noise.

@@ -310,8 +310,8 @@ class Recorder(Closable):
             raise OutputError(f"cannot write {self.path}: it was removed while it was recorded")
 
 
-def output_path(folder: Path | None, stem: str, suffix: str) -> Path:
-    """Return the path of a file that a client of the service has named; make its folder.
+def _output_path(folder: Path | None, stem: str) -> Path:
+    """Return the path of a recording that a client of the service has named; make its folder.
 
     Raises:
         OutputError: there is no folder, it cannot be made, or the name is no valid file name.
@@ -324,7 +324,7 @@ def output_path(folder: Path | None, stem: str, suffix: str) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as cause:
         raise OutputError(f"cannot write to {folder}: {cause.strerror}") from cause
-    return folder / f"{stem}{suffix}"
+    return folder / f"{stem}.mcap"
 
 
 class SessionRecorder:
@@ -363,7 +363,7 @@ class SessionRecorder:
             if self.current is not None:
                 raise OutputError(f"{self.current.path} is being recorded already")
             source = self._session.source
-            path = output_path(self._folder, name or time.strftime("%Y%m%d-%H%M%S"), ".mcap")
+            path = _output_path(self._folder, name or time.strftime("%Y%m%d-%H%M%S"))
             recorder = Recorder(path, source.sensors, metadata=dict(source.metadata))
             self.current = recorder
             self._session.add_listener(self._put)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
-from holdfast.errors import SourceError, StreamError
+from holdfast.errors import SourceError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 Work = Callable[[], None]
@@ -45,49 +45,31 @@ class RequestQueue:
     def __init__(self) -> None:
         self._requests: deque[tuple[Work, Future[None]]] = deque()
 
-    def append(self, work: Work, *, cancellable: bool = True) -> "Future[None]":
+    def append(self, work: Work) -> "Future[None]":
         """Append a request, and return its result, which is there when it was carried out.
+
+        The caller may cancel it while it waits, as after a time-out.
 
         Args:
             work: is called in the thread that carries out the requests.
-            cancellable: whether the caller may cancel it while it waits, as after a time-out.
         """
         future: Future[None] = Future()
-        # A future that runs cannot be cancelled any more.
-        if not cancellable:
-            future.set_running_or_notify_cancel()
         self._requests.append((work, future))
         return future
 
-    def carry_out(self, follow_up: Work = lambda: None) -> None:
-        """Carry out the requests that wait now, then `follow_up`, then set the results.
-
-        A request that fails has its exception as its result. If `follow_up` fails, the other
-        requests have that exception, and it is raised.
-        """
+    def carry_out(self) -> None:
+        """Carry out the requests that wait now; one that fails has its exception as its result."""
         # Those that wait now: one that a request appends comes in the next round.
-        waiting = [self._requests.popleft() for _ in range(len(self._requests))]
-        done = [future for work, future in waiting if _run(work, future)]
-        try:
-            follow_up()
-        except Exception as failure:
-            for future in done:
+        for _ in range(len(self._requests)):
+            work, future = self._requests.popleft()
+            if not future.set_running_or_notify_cancel():
+                continue
+            try:
+                work()
+            except Exception as failure:
                 future.set_exception(failure)
-            raise
-        for future in done:
-            future.set_result(None)
-
-
-def _run(work: Work, future: "Future[None]") -> bool:
-    """Run the work of a request. Return False if it was cancelled before, or has failed."""
-    if not (future.running() or future.set_running_or_notify_cancel()):
-        return False
-    try:
-        work()
-    except Exception as failure:
-        future.set_exception(failure)
-        return False
-    return True
+            else:
+                future.set_result(None)
 
 
 class InterpreterSettings:
@@ -163,7 +145,6 @@ class Session:
         delay: delay of the newest sample relative to the quickest one of the source [s].
         ended: True if the source has ended, or the detector has failed.
         failure: the exception that ended the session.
-        lock: why the tare and the thresholds cannot be changed now; empty if they can.
     """
 
     def __init__(self, stream: StreamDetector) -> None:
@@ -173,7 +154,6 @@ class Session:
         self.delay = 0.0
         self.ended = False
         self.failure: Exception | None = None
-        self.lock = ""
         # By module, counted by the session's thread; `n_packets` is the largest.
         self._n_samples = dict.fromkeys(self.source.sensors, 0)
         # A new list for each change: the session's thread may be going through the old one.
@@ -223,18 +203,16 @@ class Session:
         self.stop()
 
     def change(self, work: Work, consequence: str) -> None:
-        """Change the tare, the thresholds or the model of the detector, in its thread.
+        """Change the tare or the thresholds of the detector, in its thread.
 
         Args:
             work: the change, such as `session.stream.restart_tare`.
             consequence: what is not done if the source does not answer, for the message.
 
         Raises:
-            StreamError: the session is locked, or the detector refuses the change.
             SourceError: the source has ended or is silent.
-            ValueError, ModelError: the detector refuses the change.
+            StreamError, ValueError: the detector refuses the change.
         """
-        self.check_lock()
         if self.ended:
             raise SourceError(f"the source has ended: {consequence}")
         request = self._requests.append(work)
@@ -243,15 +221,6 @@ class Session:
         except TimeoutError as cause:
             request.cancel()  # or it would be carried out long after its caller was refused
             raise SourceError(f"the source does not answer: {consequence}") from cause
-
-    def check_lock(self) -> None:
-        """Check that tare, thresholds and model may be changed.
-
-        Raises:
-            StreamError: they may not, and why.
-        """
-        if self.lock:
-            raise StreamError(self.lock)
 
     def latency(self) -> Latency:
         """Compute the percentiles of the newest latencies."""

@@ -175,7 +175,7 @@ class SourceFilter:
 
         Args:
             arrival: of the source.
-            model: that decides now, whose rate the samples get.
+            model: whose rate the samples get.
 
         Raises:
             ModelError: the rate is not the model's, and `strict`.

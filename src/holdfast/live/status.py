@@ -2,24 +2,20 @@
 
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
 from holdfast.contact import ContactState, Fault, HandEstimate
 from holdfast.detector.slips import SlipWatch
-from holdfast.errors import ModelError
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
-from holdfast.live.handling import SessionCalibration
-from holdfast.live.panels import Panel
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.model import Model
 from holdfast.sensors.types import Array
-from holdfast.training.calibration import check_normalised
 
 MAX_BUFFERED_UPDATES = 4096
 """Maximum number of updates between two documents; older ones are dropped."""
@@ -38,23 +34,10 @@ class StatusPublisher:
     Args:
         session: to publish.
         report: called with the text of each notice about a fault or by the service.
-        panels: that run beside the session.
-        calibration: of the session; None where it is not possible.
-        document_type: type of the documents, with a field for each panel.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        report: Callable[[str], None] = lambda _: None,
-        panels: Sequence[Panel] = (),
-        calibration: SessionCalibration | None = None,
-        document_type: type[schema.LiveDocument] = schema.LiveDocument,
-    ) -> None:
+    def __init__(self, session: Session, report: Callable[[str], None] = lambda _: None) -> None:
         self._session = session
-        self._panels, self._document_type = panels, document_type
-        self._calibration = calibration
-        self._noticed = ""  # the newest text of the calibration that became a notice
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
@@ -77,10 +60,6 @@ class StatusPublisher:
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
-        text = "" if self._calibration is None else self._calibration.text
-        if text and text != self._noticed:
-            self.add_notice(text)
-        self._noticed = text
         # The session's thread goes on appending: only what is there now belongs to this document.
         updates = [self._updates.popleft() for _ in range(len(self._updates))]
         estimates = [estimate for _, update in updates for estimate in update.estimates]
@@ -93,7 +72,7 @@ class StatusPublisher:
             self._update_taxels([update for _, update in updates])
         newest = self._newest
         fingers = {} if newest is None else newest.fingers
-        return self._document_type(
+        return schema.LiveDocument(
             time=np.nan if newest is None else newest.time,
             hand=ContactState.UNKNOWN if newest is None else newest.state,
             fingers={
@@ -128,15 +107,12 @@ class StatusPublisher:
                 for problem in self._faults.current
             ],
             thresholds=dict(self._session.stream.thresholds),
-            locked=bool(self._session.lock),
-            calibration=None if self._calibration is None else self._calibration.document(),
             slips=[
                 schema.SlipDocument(*slip)
                 for estimate, updated in estimates
                 for name in updated
                 for slip in self._slips.update(name, [estimate.fingers[name]])
             ],
-            **{panel.name: panel.document() for panel in self._panels},
         )
 
     def _update_taxels(self, updates: list[StreamUpdate]) -> None:
@@ -206,18 +182,8 @@ def hello_document(session: Session, started: float, can_record: bool) -> schema
             hold=model.debounce.hold,
         ),
         operating_points=operating_points(model),
-        not_calibratable=not_calibratable(model),
         advice=[advice] if (advice := model.handling_advice(stream.fingers)) else [],
     )
-
-
-def not_calibratable(model: Model) -> str:
-    """Return why own handling cannot calibrate a model; empty if it can."""
-    try:
-        check_normalised(model)
-    except ModelError as refusal:
-        return str(refusal)
-    return ""
 
 
 def operating_points(model: Model) -> list[schema.OperatingPoint]:

@@ -83,7 +83,7 @@ class StreamDetector:
 
     Attributes:
         source: the source.
-        model: the model that decides now; change it by `set_model`.
+        model: the model.
         fingers: sensor of each finger that the model uses.
         thresholds: probability from which each finger is stable; change it by `set_threshold`.
         rate: measured rate of the source [Hz]; NaN during the first half second.
@@ -255,19 +255,6 @@ class StreamDetector:
             self._detector.set_thresholds(thresholds)
         self.thresholds = thresholds
 
-    def set_model(self, model: Model) -> None:
-        """Change the model to one of the same features, such as the model with own handling.
-
-        States and filters continue: nothing warms up again. The thresholds are those of the model.
-
-        Raises:
-            ModelError: it has other features or another debouncing; nothing has changed then.
-        """
-        if self._detector is not None:
-            self._detector.set_model(model)
-        self.model = model
-        self.set_threshold(None)
-
     def restart_tare(self) -> None:
         """Discard the tare, and take a new one from the next samples.
 
@@ -288,31 +275,11 @@ class StreamDetector:
         self._filter.compare_from_now()
 
     def start_metadata(self) -> dict[str, Any]:
-        """Return the metadata of a recording that begins now, which has the zero of this stream.
-
-        Without it, the tare of the recording would be what the hand holds now.
-        """
-        detector = self._detector
-        # Where the zero is not known, only contact now shows that the first samples are load.
-        if detector is not None and not detector.knows_zero:
-            fingers = () if self._last is None else self._last.fingers.values()
-            return {STARTS_LOADED: True} if any(x.state in TOUCHING for x in fingers) else {}
-        known = self._begin.baselines if detector is None else detector.baselines()
-        if not (known or (detector is None and self._begin.loaded)):
+        """Return the metadata of a recording that begins with this stream, and has its zero."""
+        if not self._begin.loaded:
             return {}
-        baselines = {name: values.copy() for name, values in known.items()}
-        for name, values in baselines.items():
-            values[list(self._ignore.get(name, ()))] = 0.0  # as `without_ignored` does to readings
-        stated = {name: values.tolist() for name, values in baselines.items()}
+        stated = {name: values.tolist() for name, values in self._begin.baselines.items()}
         return {STARTS_LOADED: True, **({BASELINES: stated} if stated else {})}
-
-    def without_ignored(self, name: str, readings: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Return (n, n_taxels, 3) readings of a finger, 0 in the taxels that are ignored."""
-        taxels = list(self._ignore.get(name, ()))
-        if taxels:
-            readings = readings.copy()
-            readings[:, taxels] = 0
-        return readings
 
     def subtract_tare(self, samples: ModuleSamples) -> dict[str, npt.NDArray[np.float64]]:
         """Return (n_taxels, 3) minus the tare, for the fingers whose tare is complete."""

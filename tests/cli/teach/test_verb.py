@@ -125,7 +125,7 @@ GUIDED = {
     ),
     "a folder of --from": (
         ["teach", "--from", "grasps", "-o", "new.json", "--resume"],
-        "holdfast: --camera, --to, --resume, --unattended and --page need a SOURCE",
+        "holdfast: --camera, --to, --resume and --unattended need a SOURCE",
     ),
     "a camera of the twin": (
         ["teach", "twin:", "-o", "new.json", "--camera", "0"],

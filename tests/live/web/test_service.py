@@ -31,14 +31,13 @@ PATIENCE = 30.0
 
 @asynccontextmanager
 async def served(
-    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, panels=(),
-    model=None,
+    source, token=None, host="127.0.0.1", folder=None, start=True, reports=None, model=None,
 ):  # fmt: skip
     """Yield a client of the service of a source, and the session."""
     model = model or build.model()
     session = Session(StreamDetector(model, source))
     report = [].append if reports is None else reports.append
-    service = LiveService(session, Guard(host, token), folder, report, panels)
+    service = LiveService(session, Guard(host, token), folder, report)
     runner = web.AppRunner(service.app, shutdown_timeout=0.5)
     await runner.setup()
     await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -379,22 +378,6 @@ def test_the_threshold_is_changed_and_noticed():
     assert restored["thresholds"] == dict.fromkeys(build.FINGERS, own)
     texts = [document["notices"][0]["text"] for document in (changed, restored)]
     assert texts == reports == ["threshold set to 0.75", "threshold of the model restored"]
-
-
-def test_tare_and_thresholds_of_a_locked_session_are_refused():
-    async def work():
-        async with served(patient(10)) as (client, session):
-            before = dict(session.stream.thresholds)
-            session.lock = "the hand is armed"
-            found = [
-                await reply(client, "POST", "tare"),
-                await reply(client, "POST", "threshold", json={"value": 1.0}),
-                await reply(client, "DELETE", "threshold"),
-            ]
-            assert session.stream.thresholds == before
-        return found
-
-    assert run(work()) == [(409, {"error": "the hand is armed"})] * 3
 
 
 REFUSED = {

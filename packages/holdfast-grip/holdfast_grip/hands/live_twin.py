@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from holdfast.devices.sources import Arrival, Source
-from holdfast.devices.sources.replay import PAUSE
 from holdfast.devices.sources.twin import grasp_of
 from holdfast.devices.uri import parse
 from holdfast.sensors import Sensor
@@ -30,7 +29,6 @@ class LiveTwin(Source, HandDevice):
     Args:
         uri: as of the source: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference`.
         speed: 1 is real time, 0 is as fast as samples are read.
-        loop: begin the grasp again at its end; the times continue after a pause.
 
     Attributes:
         simulation: the simulation; None while the twin is closed.
@@ -49,15 +47,13 @@ class LiveTwin(Source, HandDevice):
 
     fingers = FINGERS
 
-    def __init__(self, uri: str = "twin:", *, speed: float = 1.0, loop: bool = False) -> None:
+    def __init__(self, uri: str = "twin:", *, speed: float = 1.0) -> None:
         self.grasp = grasp_of(parse(uri)[1])
         if self.grasp.server:
             raise ValueError(f"{uri}: server=false expected while the twin takes commands")
         self.name, self.speed, self.paced = uri, speed, speed > 0
         self.simulation: Simulation | None = None
         self._scales = np.ones(len(FINGERS))
-        self._loops = loop
-        self._shift = 0.0  # of the times of this grasp
         self._begun_at: float | None = None
         self._reports: deque[Array] = deque(maxlen=MAX_JOINT_REPORTS)
 
@@ -78,12 +74,11 @@ class LiveTwin(Source, HandDevice):
     @property
     def ended(self) -> bool:
         """Whether the grasp is complete."""
-        return self.simulation is None or (self.simulation.is_over and not self._loops)
+        return self.simulation is None or self.simulation.is_over
 
     def open(self) -> None:
         """Begin the grasp."""
         self.forget()
-        self._shift = 0.0
         self.simulation = Simulation(self.grasp)
         self._scales = np.ones(len(FINGERS))
         self._begun_at = None
@@ -92,14 +87,6 @@ class LiveTwin(Source, HandDevice):
         """Simulate the next sample, and return it when it is due. The first read is the begin."""
         if self.simulation is None or self.ended:
             return None
-        if self.simulation.is_over:
-            # Begin the grasp once more, after a pause.
-            ended_at = self.simulation.time
-            self._sent = None  # the new grasp has no command yet
-            self.simulation = Simulation(self.grasp)
-            self._scales = np.ones(len(FINGERS))
-            self._shift += ended_at + PAUSE
-            self._begun_at = time.monotonic() + PAUSE / self.speed if self.paced else None
         if self._begun_at is None:
             self._begun_at = time.monotonic()
         if self.paced:
@@ -108,7 +95,7 @@ class LiveTwin(Source, HandDevice):
             time.sleep(max(min(wait, timeout), 0.0))
             if wait > timeout:
                 return None
-        at = self._shift + self.simulation.time
+        at = self.simulation.time
         self.simulation.step(self._scales)
         self._reports.append(self.simulation.joint_angles())
         return Arrival(at, self.simulation.read(), time.monotonic())

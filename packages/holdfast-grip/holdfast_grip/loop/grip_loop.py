@@ -9,7 +9,7 @@ from typing import Self
 from msgspec import structs
 
 from holdfast.contact import HandEstimate
-from holdfast_grip.command import GripCommand, GripReason, LoopState, event_texts
+from holdfast_grip.command import GripCommand, GripReason, event_texts
 from holdfast_grip.controller import GripController
 from holdfast_grip.errors import HandError
 from holdfast_grip.guard import CommandGuard, safe_command
@@ -43,7 +43,7 @@ class GripLoop:
         n_sent: number of commands that were sent; a hand gets no command twice, see `HandDevice`.
     """
 
-    # Newest time of a step; infinite before the first one and after `resume`.
+    # Newest time of a step; infinite before the first one.
     _now = -math.inf
     _ahead = math.nan  # the time of the last step, if the clock jumped to it
     # Newest command that left, whose scales the safe command keeps.
@@ -62,34 +62,8 @@ class GripLoop:
         self.guard = CommandGuard(controller.limits)
         self.last: GripCommand | None = None
         self.n_sent = 0
-        self._stays_open = False  # after a stop or fault that opened the hand and was ended
         self._watchdog = watchdog
         self._log = log or (lambda text, time: None)
-
-    @property
-    def stopped(self) -> bool:
-        """Whether `stop` was called, and not `resume` after it."""
-        return self.guard.stopped
-
-    def stop(self) -> None:
-        """Replace every command by the safe one, from the next step until `resume`.
-
-        It may be called in any thread, also while `step` runs. Only `step` sends: call it next,
-        without data with an estimate that has no fingers.
-        """
-        self.guard.stop()
-
-    def resume(self) -> None:
-        """End a stop or a fault, by the decision of a person.
-
-        A hand that was opened is released once more, which ends its grip, and gets no command
-        until it holds something again: a reset must not close it. The next step may have any
-        time: a clock that has jumped is accepted.
-        """
-        self._now, self._ahead = -math.inf, math.nan
-        self._stays_open = self.last is not None and self.last.release
-        self.controller.resume()
-        self.guard.resume()
 
     def step(
         self,
@@ -127,15 +101,10 @@ class GripLoop:
         admitted = self.guard.admit(command, clock)
         if self.guard.violation != violated:
             self._log(f"grip FAULT (limit): {self.guard.violation}", command.time)
-        before, self.last = self.last, admitted or self.last or command
-        self._stays_open = self._stays_open and self.last.state is LoopState.IDLE
-        if self._stays_open:
-            self.last = structs.replace(self.last, release=True)
-        # The first IDLE command after a reset has released the hand; no other one is sent.
-        repeats = self._stays_open and before is not None and before.state is LoopState.IDLE
+        self.last = admitted or self.last or command
         if self.armed:
             self._beat(self.last)
-            if admitted is not None and not repeats:
+            if admitted is not None:
                 self.n_sent += self.hand.send(self.last)
                 self._sent = self.last
                 if self._watchdog is not None:
@@ -174,8 +143,6 @@ class GripLoop:
 
     def _update(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Update the controller; return its command, whose time is finite."""
-        if self.stopped:
-            self.controller.stop()
         command = self.controller.update(estimate, self._advance(time))
         n_fingers = len(self.controller.loaded_fingers)
         for at, text in event_texts(self.controller.events(), n_fingers):

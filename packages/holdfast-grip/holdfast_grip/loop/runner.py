@@ -4,12 +4,11 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import Future
 from threading import Event
 from typing import NamedTuple
 
-from holdfast.contact import ContactState, HandEstimate
-from holdfast.live.session import RequestQueue, Session
+from holdfast.contact import HandEstimate
+from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast_grip.command import GripCommand, GripReason
 from holdfast_grip.loop.grip_loop import GripLoop
@@ -23,8 +22,6 @@ MIN_TIME_STEP = 1e-6
 stamp are one unit in the last place apart, and would never be old."""
 MAX_PENDING = 512
 """Number of newest updates that wait for the next step: more than come in `MAX_PAUSE`."""
-NO_DATA = HandEstimate(0.0, ContactState.UNKNOWN, {})
-"""Estimate with which a loop is stepped that is stopped before the first one."""
 
 
 class _Arrived(NamedTuple):
@@ -37,8 +34,7 @@ class _Arrived(NamedTuple):
 class LoopRunner:
     """Step a loop with the updates that it gets, in one thread.
 
-    `put`, `stop` and `reset` may be called in any thread and return at once. A stop does not
-    wait for the updates that are pending.
+    `put` may be called in any thread and returns at once.
 
     A paced source goes on while the hand takes a command. So each step takes all pending updates:
     the controller gets every estimate, and the hand only the command of the newest one. Its age
@@ -62,7 +58,6 @@ class LoopRunner:
         self._on_command = on_command
         self._pending: deque[_Arrived] = deque(maxlen=MAX_PENDING)
         self._wake = Event()
-        self._requests = RequestQueue()
         self._estimate: HandEstimate | None = None
         self._received = 0.0
         self._received_time = math.nan  # of the estimate whose samples came then
@@ -72,16 +67,6 @@ class LoopRunner:
         """Append an update to those that are pending; a listener of a session."""
         self._pending.append(_arrived(update))
         self._wake.set()
-
-    def stop(self) -> "Future[None]":
-        """Bring the hand into its safe state; the result is there when the command was sent."""
-        self.loop.stop()
-        # Once more after a reset that is in the queue already.
-        return self._request(self.loop.stop)
-
-    def reset(self) -> "Future[None]":
-        """End a stop or a fault, by the decision of a person."""
-        return self._request(self.loop.resume)
 
     def run(self, is_over: Callable[[], bool]) -> None:
         """Step the loop until `is_over` and nothing is pending.
@@ -96,16 +81,18 @@ class LoopRunner:
             self._process([self._pending.popleft() for _ in range(len(self._pending))])
 
     def process(self, update: StreamUpdate | None) -> None:
-        """Carry out the requests, and step the loop with an update; None if nothing arrived.
+        """Step the loop with an update; None if nothing arrived.
 
         Raises:
-            HandError: as `GripLoop.step`; waiting requests get it too.
+            HandError: as `GripLoop.step`.
         """
         self._process([] if update is None else [_arrived(update)])
 
     def _process(self, arrived: Sequence[_Arrived]) -> None:
-        step = self._step if self._speed else self._step_each
-        self._requests.carry_out(lambda: step(arrived))
+        if self._speed:
+            self._step(arrived)
+        else:
+            self._step_each(arrived)
 
     def _step(self, arrived: Sequence[_Arrived]) -> None:
         """Step the loop of a paced source once, with the newest estimate."""
@@ -122,7 +109,6 @@ class LoopRunner:
                 self._received = max(received for update, received in arrived if update.estimates)
             self._estimate = newest
         if self._estimate is None:
-            self._step_without_samples()
             return
         self._stepped_at = now
         fault = GripReason.BEHIND if behind else GripReason.NONE
@@ -133,24 +119,8 @@ class LoopRunner:
 
     def _step_each(self, arrived: Sequence[_Arrived]) -> None:
         """Step the loop of a source that is not paced, with each estimate."""
-        estimates = _estimates(arrived)
-        for estimate in estimates:
-            self._estimate = estimate
+        for estimate in _estimates(arrived):
             self._on_command(self.loop.step(estimate, estimate.time))
-        if not estimates:
-            self._step_without_samples()
-
-    def _step_without_samples(self) -> None:
-        """Send the safe command of a stop, where no time passes without samples."""
-        if self.loop.stopped:
-            estimate = self._estimate or NO_DATA
-            self._on_command(self.loop.step(estimate, estimate.time))
-
-    def _request(self, work: Callable[[], None]) -> "Future[None]":
-        """Run `work` before the next step, and step at once."""
-        result = self._requests.append(work, cancellable=False)
-        self._wake.set()
-        return result
 
 
 def run_session(

@@ -8,11 +8,11 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.cli.app import spread_groups
-from holdfast.cli.serve import serve
 from holdfast.io import load_recording, save_recording
 from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast_grip import GripCommand, Limits
+from holdfast_grip.hands import Claim
 from holdfast_grip.hold import hold
 from holdfast_grip.loop import watchdog
 from holdfast_grip.options import GripSettings
@@ -90,9 +90,8 @@ def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monke
     assert printed[0]["state"] == "IDLE"
 
 
-@pytest.mark.parametrize("verb", [hold, serve])
-def test_the_limits_are_those_of_the_trials(verb):
-    given = signature(spread_groups(verb)).parameters
+def test_the_limits_are_those_of_the_trials():
+    given = signature(spread_groups(hold)).parameters
     names = ("max_scale", "min_scale", "max_force", "on_fault")
     settings = GripSettings("", **{name: given[name].default for name in names})
     assert settings.limits() == LIMITS == Limits()
@@ -123,3 +122,25 @@ def test_bad_input_is_one_line(grasp, capsys, words, message):
     assert main(["hold", "builtin:twin", str(grasp), *words, "--speed", "0"]) == 2
     error = capsys.readouterr().err
     assert message in error.splitlines()[-1]
+
+
+def test_a_hand_that_does_not_answer_or_is_in_use(grasp, capsys, tmp_path):
+    hand = f"log:{tmp_path / 'none' / 'hand'}"
+    words = ["hold", "builtin:twin", str(grasp), "--hand", hand, "--armed", "--confirm", hand]
+    assert main(words) == 2
+    assert "cannot write" in capsys.readouterr().err
+    with Claim(hand):
+        assert main(words) == 2
+    text = f"holdfast: {hand} has another controller already: stop that one first\n"
+    assert capsys.readouterr().err == text
+
+
+def test_a_model_without_a_finger_of_the_hand(capsys, tmp_path):
+    path = tmp_path / "thumb.json"
+    model = Model.load("builtin:twin")
+    msgspec.structs.replace(model, fingers={"thumb": model.fingers["*"]}).save(path)
+    assert main(["hold", str(path), "twin:?object=ball", "--hand", "twin:"]) == 2
+    assert (
+        "holdfast: twin:?object=ball also holds with index, middle, ring, of which the model gives "
+        "no estimates"
+    ) in capsys.readouterr().err

@@ -46,10 +46,10 @@ def confirm_safety(camera: str, stop: StopRequest, keys: MarkerKeys, screen: Tea
     Args:
         camera: what a camera measures, or what cannot be promised without one.
         stop: of the signals.
-        keys: of the terminal, a pipe or the page.
+        keys: of the terminal or a pipe.
         screen: that shows the questions.
     """
-    screen.ask([*SAFETY, *camera.splitlines(), "Enter: all of this holds   q: quit"])
+    screen.print(*SAFETY, *camera.splitlines(), "Enter: all of this holds   q: quit")
     while not (stop.requested or keys.stop_pressed):
         answers = keys.poll()
         if "next" in answers:

@@ -1,26 +1,22 @@
 """Options of the guided protocol of `holdfast teach`, and the protocol with them."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from holdfast.cli.options import LOCALHOST, CameraOption, ServerOptions, awaited, check_speed
-from holdfast.cli.teach.screen import TeachKeys, TeachScreen
+from holdfast.cli.options import CameraOption, awaited, check_speed
+from holdfast.cli.teach.screen import TEACH_KEYS, TeachScreen
 from holdfast.cli.terminal.console import message_if_slow, print_message
-from holdfast.cli.terminal.control import handle_stop_signals
+from holdfast.cli.terminal.control import MarkerKeys, handle_stop_signals
 from holdfast.errors import HoldfastError, TrainingError, require_extras
 
 if TYPE_CHECKING:
     from holdfast.live.teaching.folder import TeachingFolder
-    from holdfast.live.teaching.service import TeachService
     from holdfast.model import Model
 
-TEACH_ADDRESS = ServerOptions(LOCALHOST, port=8082)
-"""Default address of the page."""
 WITH_CAMERA = (
     "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm\n"
     "on. Smaller slips, and those of the other fingers, are not promised."
@@ -48,14 +44,6 @@ class GuideOptions:
         bool, typer.Option("--unattended", help="With twin: only: no keys, faster than real time.")
     ] = False
 
-    page: Annotated[
-        bool,
-        typer.Option(
-            "--page",
-            help="Show it on a page as well, for a phone: --host 0.0.0.0 --token-file FILE.",
-        ),
-    ] = False
-
     def check(self, source: str, data: Path | None, speed: float) -> None:
         """Check that the options fit each other.
 
@@ -68,7 +56,7 @@ class GuideOptions:
             raise ValueError(f"a SOURCE, or recordings with --from, expected; {given} given")
         if data is not None:
             if self != WITHOUT_PROTOCOL:
-                raise ValueError("--camera, --to, --resume, --unattended and --page need a SOURCE")
+                raise ValueError("--camera, --to, --resume and --unattended need a SOURCE")
             return
         check_speed(source, speed)
         if is_twin(source):
@@ -82,9 +70,7 @@ class GuideOptions:
             )
         require_extras("label", *(("video",) if self.camera else ()))
 
-    def run(
-        self, source: str, model: "Model", out: Path, speed: float, access: ServerOptions
-    ) -> "TeachingFolder":
+    def run(self, source: str, model: "Model", out: Path, speed: float) -> "TeachingFolder":
         """Lead through the protocol, and return the folder of its grasps.
 
         Raises:
@@ -108,9 +94,8 @@ class GuideOptions:
         if self.camera:  # a wrong one is reported before somebody stands at the robot
             CameraRecorder(self.camera, path / "camera.mp4").close()
         with handle_stop_signals() as stop, ExitStack() as stack:
-            page = stack.enter_context(_page(access)) if self.page else None
-            keys = stack.enter_context(TeachKeys(page))
-            screen = TeachScreen(page, is_read=not self.unattended)
+            keys = stack.enter_context(MarkerKeys(TEACH_KEYS))
+            screen = TeachScreen(is_read=not self.unattended)
             stop.graceful = True
             promise = WITH_CAMERA if is_filmed else WITHOUT_CAMERA
             if not (self.unattended or confirm_safety(promise, stop, keys, screen)):
@@ -131,20 +116,6 @@ class GuideOptions:
 
 WITHOUT_PROTOCOL = GuideOptions()
 """Options of `--from`, which records nothing."""
-
-
-@contextmanager
-def _page(access: ServerOptions) -> "Iterator[TeachService]":
-    """Serve the page of the protocol, and print its address."""
-    from holdfast.live.teaching.service import TeachService, serving
-    from holdfast.web.guard import Guard
-    from holdfast.web.server import page_url
-
-    token = access.find_token()
-    service = TeachService(Guard(access.host, token))
-    with serving(service, access.host, access.port) as url:
-        print_message(f"{page_url(url, token)} shows the protocol")
-        yield service
 
 
 def is_twin(source: str) -> bool:

@@ -1,15 +1,12 @@
 """What the guided protocol of `holdfast teach` shows in a terminal, and its keys."""
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from holdfast.cli.terminal.console import print_message, visible
-from holdfast.cli.terminal.control import MarkerKeys
 from holdfast.cli.terminal.progress import LiveDisplay
 
 if TYPE_CHECKING:
     from holdfast.live.teaching.protocol import View
-    from holdfast.live.teaching.service import TeachService
 
 TEACH_KEYS = {
     "\n": "next",
@@ -55,51 +52,19 @@ def screen_lines(view: "View", place: str) -> list[str]:
     return [line[:SCREEN_WIDTH].rstrip() for line in lines]
 
 
-class TeachKeys(MarkerKeys):
-    """Keys of the terminal and of the page.
-
-    Args:
-        page: of the protocol; None without one.
-    """
-
-    def __init__(self, page: "TeachService | None" = None) -> None:
-        super().__init__(TEACH_KEYS)
-        self._page = page
-
-    @property
-    def ended(self) -> bool:
-        """Whether nothing can be read any more; never with a page."""
-        return self._page is None and super().ended
-
-    def poll(self) -> list[str]:
-        """Return keys and lines since the last call."""
-        return [*super().poll(), *(self._page.pop() if self._page else ())]
-
-
 class TeachScreen(LiveDisplay):
     """Screen of the protocol: on a terminal one that is drawn again, elsewhere a line a change.
 
     Args:
-        page: that shows the same; None without one.
         is_read: whether a person or a robot follows each change.
     """
 
-    def __init__(self, page: "TeachService | None" = None, *, is_read: bool = True) -> None:
+    def __init__(self, *, is_read: bool = True) -> None:
         super().__init__()
-        self._page, self._shown, self._is_read = page, "", is_read
-
-    def ask(self, lines: Sequence[str]) -> None:
-        """Ask whether the protocol can begin."""
-        self.print(*lines)
-        if self._page is not None:
-            from holdfast.live.teaching.protocol import View
-
-            self._page.show(View("Before you go on", "IS IT SAFE?", "\n".join(lines[:-1])), "")
+        self._shown, self._is_read = "", is_read
 
     def show(self, view: "View", place: str) -> None:
         """Show what a person sees now; elsewhere than on a terminal, what has changed."""
-        if self._page is not None:
-            self._page.show(view, place)
         if self._live is None:
             text = ": ".join(filter(None, (view.title, view.words, view.message * view.decides)))
             if text != self._shown and self._is_read:

@@ -12,12 +12,11 @@ from holdfast.cli.options import (
     JsonOption,
     ModelOutput,
     SeedOption,
-    ServerOptions,
     SpeedOption,
     StartOptions,
     check_source,
 )
-from holdfast.cli.teach.options import TEACH_ADDRESS, WITHOUT_PROTOCOL, GuideOptions, calibrated
+from holdfast.cli.teach.options import WITHOUT_PROTOCOL, GuideOptions, calibrated
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import TrainingError
@@ -53,7 +52,6 @@ def teach(
         ),
     ] = 1.5,
     speed: Annotated[SpeedOption, RARE] = 1.0,
-    access: Annotated[ServerOptions, RARE] = TEACH_ADDRESS,
     parallel: EngineOptions,
     seed: Annotated[SeedOption, RARE] = 0,
     force: ForceOption = False,
@@ -89,7 +87,7 @@ def teach(
     given, engine = Model.load(model), parallel.start()
     base, steps, path = given, [], data
     if path is None:
-        folder = guide.run(source, given, out, speed, access)
+        folder = guide.run(source, given, out, speed)
         base, is_calibrated = calibrated(given, folder)
         steps, path = folder.results, folder.path
         if not any(result.n_slides for result in folder.kept):

@@ -3,15 +3,12 @@
 New fields may be added under this name; existing ones do not change.
 """
 
-from collections.abc import Sequence
-from typing import Any, Literal
+from typing import Literal
 
-import msgspec
 from msgspec import Struct
 
 from holdfast.contact import ContactState, Fault
 from holdfast.live.documents import FingerDocument, Number, Vector
-from holdfast.live.panels import Panel
 
 
 class FingerInfo(Struct, frozen=True, kw_only=True):
@@ -85,7 +82,6 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
         faults: texts about every fault.
         debounce: of the model.
         operating_points: by increasing threshold; empty if the model has none.
-        not_calibratable: why own handling cannot calibrate the model; empty if it can.
         advice: about the model on these fingers, such as own handling of another sensor.
     """
 
@@ -99,7 +95,6 @@ class HelloDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="he
     faults: dict[Fault, FaultInfo] = {}
     debounce: DebounceInfo | None = None
     operating_points: list[OperatingPoint] = []
-    not_calibratable: str = ""
     advice: list[str] = []
     schema: Literal["holdfast.live/1"] = "holdfast.live/1"
 
@@ -216,35 +211,6 @@ class RecordingInfo(Struct, frozen=True, kw_only=True, gc=False):
     n_dropped: int
 
 
-CalibrationState = Literal["idle", "recording", "fitting"]
-
-
-class CalibrationDocument(Struct, frozen=True, kw_only=True, gc=False):
-    """Progress and result of a calibration by own handling.
-
-    Attributes:
-        state: of the calibration; recording while the user handles objects.
-        seconds: held time so far, of the finger that holds longest [s].
-        least: held time from which it may be ended [s].
-        enough: held time from which that gives no warning [s].
-        most: held time at which it ends by itself [s].
-        calibrated: whether the running model has been calibrated, and that can be undone.
-        refused: whether the text is a refusal; the model is then as before.
-        text: what the last calibration saw and changed, or why it was refused.
-        warnings: of the last calibration.
-    """
-
-    state: CalibrationState
-    seconds: float
-    least: float
-    enough: float
-    most: float
-    calibrated: bool
-    refused: bool
-    text: str
-    warnings: list[str]
-
-
 class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="live"):
     """Current state, and everything since the previous document.
 
@@ -260,9 +226,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
         ended: whether the source has ended.
         problems: faults that last.
         thresholds: probability from which each finger is stable now.
-        locked: whether the tare, the thresholds and the model cannot be changed.
         slips: that began or ended since the previous document.
-        calibration: by own handling; null where it is not possible.
     """
 
     time: Number
@@ -276,23 +240,7 @@ class LiveDocument(Struct, frozen=True, kw_only=True, tag_field="type", tag="liv
     ended: bool
     problems: list[ProblemDocument] = []
     thresholds: dict[str, float] = {}
-    locked: bool = False
     slips: list[SlipDocument] = []
-    calibration: CalibrationDocument | None = None
-
-
-def live_document_type(panels: Sequence[Panel]) -> type[LiveDocument]:
-    """Return the type of live documents with a field for each panel, of its name.
-
-    Args:
-        panels: their documents are in the fields.
-    """
-    fields = [(panel.name, panel.document_type | None, None) for panel in panels]
-    kind: type[Any] = msgspec.defstruct(
-        "LiveDocument", fields, bases=(LiveDocument,), namespace={"__doc__": LiveDocument.__doc__},
-        module=__name__, frozen=True, kw_only=True, tag_field="type", tag="live",
-    )  # fmt: skip
-    return kind
 
 
 class EstimateDocument(

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Callable
 from contextlib import suppress
 from functools import partial
 from http import HTTPStatus
@@ -15,8 +15,6 @@ from aiohttp import WSMsgType, web
 
 from holdfast.errors import HoldfastError
 from holdfast.live.documents import finger_document
-from holdfast.live.handling import SessionCalibration
-from holdfast.live.panels import Panel
 from holdfast.live.recorder import SessionRecorder
 from holdfast.live.session import Session
 from holdfast.live.status import StatusPublisher, hello_document, recording_info
@@ -45,19 +43,6 @@ SHARED_FOLDER = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
 
 _encode = msgspec.json.Encoder().encode
-
-
-def page_with(panels: Sequence[Panel]) -> str:
-    """Return the page with its panels; `main.js` imports their scripts by their names."""
-    page = (PAGE_FOLDER / "index.html").read_text("utf-8")
-    names = " ".join(panel.name for panel in panels)
-    styles = "".join(
-        f'<link rel="stylesheet" href="panels/{panel.name}/panel.css">' for panel in panels
-    )
-    parts = "".join((panel.folder / "panel.html").read_text("utf-8") for panel in panels)
-    for mark, text in {"styles": styles, "panels": parts, "names": names}.items():
-        page = page.replace(f"<!--{mark}-->" if mark != "names" else "{names}", text)
-    return page
 
 
 class WebSocketClient:
@@ -109,7 +94,6 @@ class LiveService:
         guard: check of every request.
         folder: for recordings; None if the service may not record.
         report: called with the text of each notice about a fault or by the service.
-        panels: that run beside the session.
 
     Attributes:
         app: the web application.
@@ -121,16 +105,10 @@ class LiveService:
         guard: Guard,
         folder: Path | None = None,
         report: Callable[[str], None] = lambda _: None,
-        panels: Sequence[Panel] = (),
     ) -> None:
         self._session = session
         self._recorder = SessionRecorder(session, folder)
-        self._calibration = SessionCalibration(session, folder)
-        self._panels = panels
-        self._live_type = schema.live_document_type(panels)
-        self._status = StatusPublisher(session, report, panels, self._calibration, self._live_type)
-        for panel in panels:
-            panel.add_listener(self._mark)
+        self._status = StatusPublisher(session, report)
         self._started = time.time()
         self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
         self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
@@ -151,18 +129,9 @@ class LiveService:
             web.post("/api/v1/recording", self.post_recording),
             web.delete("/api/v1/recording", self.delete_recording),
             web.post("/api/v1/markers", self.post_marker),
-            *CalibrationRoutes(self._calibration, self._bodies).routes(),
-            *(web.static(f"/panels/{panel.name}", panel.folder) for panel in self._panels),
-            *(route for panel in self._panels for route in panel.routes(self._status.add_notice)),
         ]
         self.app.add_routes(routes)
         self.app.cleanup_ctx.append(self._publish)
-
-    def _mark(self, text: str, time: float) -> None:
-        """Add an event of a panel to the recording, if one is running."""
-        recorder = self._recorder.current
-        if recorder is not None:
-            recorder.add_marker(text, time)
 
     async def _publish(self, _: web.Application) -> AsyncIterator[None]:
         """Publish the session while the application runs."""
@@ -239,13 +208,13 @@ class LiveService:
     def _hello(self) -> schema.HelloDocument:
         return hello_document(self._session, self._started, self._recorder.enabled)
 
-    async def get_page(self, _: web.Request) -> web.Response:
-        """Return the page, with the panels of plug-ins."""
-        return web.Response(text=page_with(self._panels), content_type="text/html")
+    async def get_page(self, _: web.Request) -> web.FileResponse:
+        """Return the page."""
+        return web.FileResponse(PAGE_FOLDER / "index.html")
 
     async def get_schema(self, _: web.Request) -> web.Response:
         """Return the JSON Schema of all documents of the WebSockets."""
-        documents = (schema.HelloDocument, self._live_type, schema.EstimateDocument)
+        documents = (schema.HelloDocument, schema.LiveDocument, schema.EstimateDocument)
         schemas, components = msgspec.json.schema_components(documents)
         return _json({"anyOf": schemas, "$defs": components})
 
@@ -280,15 +249,7 @@ class LiveService:
     async def post_recording(self, request: web.Request) -> web.Response:
         """Begin to record."""
         name = (await self._bodies.read(request, _FileRequest)).name
-
-        def start() -> dict[str, str]:
-            path = self._recorder.start(name)
-            # The events of panels before this are not in the recording; a summary stands for them.
-            for panel in self._panels:
-                self._recorder.add_marker(panel.summary())
-            return {"path": str(path)}
-
-        return await _answer(start)
+        return await _answer(lambda: {"path": str(self._recorder.start(name))})
 
     async def delete_recording(self, _: web.Request) -> web.Response:
         """End the recording, and return its progress."""
@@ -322,50 +283,3 @@ async def _answer(work: Callable[[], object]) -> web.Response:
 
 def _json(value: object, status: int = 200) -> web.Response:
     return web.Response(body=_encode(value), content_type="application/json", status=status)
-
-
-class CalibrationRoutes:
-    """Routes of the calibration by own handling.
-
-    Args:
-        calibration: of the session.
-        bodies: reader of the bodies of requests.
-    """
-
-    def __init__(self, calibration: SessionCalibration, bodies: BodyReader) -> None:
-        self._calibration = calibration
-        self._bodies = bodies
-
-    def routes(self) -> list[web.AbstractRouteDef]:
-        """Return the routes."""
-        return [
-            web.get("/api/v1/calibration", self.get),
-            web.post("/api/v1/calibration", partial(self._change, self._calibration.start)),
-            web.delete("/api/v1/calibration", partial(self._change, self._calibration.cancel)),
-            web.post("/api/v1/calibration/finish", partial(self._change, self._calibration.finish)),
-            web.get("/api/v1/calibration/model", self.get_model),
-            web.post("/api/v1/calibration/model", self.post_model),
-        ]
-
-    async def get(self, _: web.Request) -> web.Response:
-        """Return the state of the calibration."""
-        return _json(self._calibration.document())
-
-    async def get_model(self, _: web.Request) -> web.Response:
-        """Return the calibrated model as a file."""
-        answer = await _answer(lambda: msgspec.Raw(self._calibration.encoded_model()))
-        if answer.status == HTTPStatus.OK:
-            answer.headers["Content-Disposition"] = 'attachment; filename="calibrated.json"'
-        return answer
-
-    async def post_model(self, request: web.Request) -> web.Response:
-        """Save the calibrated model in the folder of recordings."""
-        name = (await self._bodies.read(request, _FileRequest)).name
-        return await _answer(lambda: {"path": str(self._calibration.save(name))})
-
-    async def _change(self, work: Callable[[], None], _: web.Request) -> web.Response:
-        def changed() -> schema.CalibrationDocument:
-            work()
-            return self._calibration.document()
-
-        return await _answer(changed)

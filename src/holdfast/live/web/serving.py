@@ -1,11 +1,10 @@
 """Run the live page: of a session, or of a recording that is replayed."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
 from holdfast.devices.sources import open_source
-from holdfast.live.panels import Panel
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web.service import LiveService
@@ -23,7 +22,6 @@ def run_page(
     guard: Guard | None = None,
     folder: Path,
     report: Callable[[str], None],
-    panels: Sequence[Panel] = (),
     stay: bool,
 ) -> None:
     """Run the live page of a session until Ctrl-C, or until the source ends if not `stay`.
@@ -36,14 +34,13 @@ def run_page(
         guard: access control; by default only this machine can connect.
         folder: folder for recordings.
         report: called with the text of each notice.
-        panels: that run beside the session.
         stay: continue when the source has ended.
 
     Raises:
         OutputError: the address is not available.
         Exception: the failure of the session.
     """
-    service = LiveService(session, guard or Guard(host), folder, report, panels)
+    service = LiveService(session, guard or Guard(host), folder, report)
     session.start()
     server.run_server(
         service.app, host, port, announce,

@@ -12,18 +12,14 @@ export function addressWithToken(path) {
   return url;
 }
 
-/**
- * Call the service; throw an Error with the message of the service if it refuses.
- *
- * @param signal {AbortSignal} ends the request; it counts as one without an answer.
- */
-export async function callService(method, path, body, signal) {
+/** Call the service; throw an Error with the message of the service if it refuses. */
+export async function callService(method, path, body) {
   const headers = token === null ? {} : { Authorization: `Bearer ${token}` };
   if (body !== undefined) headers["Content-Type"] = "application/json";
   let response;
   try {
     response = await fetch(address(`api/v1/${path}`), {
-      method, headers, signal, cache: "no-store",
+      method, headers, cache: "no-store",
       body: body === undefined ? undefined : JSON.stringify(body),
     });
   } catch {

@@ -20,7 +20,6 @@ from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detector import detect
 from holdfast.io import load_recording
 from holdfast.live.fault_notices import FAULT_TEXTS
-from holdfast.live.web.service import page_with
 from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.web.guard import SECURITY_HEADERS
@@ -143,7 +142,7 @@ class Tape:
             "rate": 150.0, "started": time.time(), "can_record": True,
             "faults": {fault: text._asdict() for fault, text in FAULT_TEXTS.items()},
             "debounce": {"min_duration": 0.0, "hysteresis": 0.0, "hold": 0.1},
-            "operating_points": self.points, "not_calibratable": "", "advice": self.advice,
+            "operating_points": self.points, "advice": self.advice,
         }  # fmt: skip
 
     def message(self, start, stop):
@@ -214,24 +213,8 @@ class Tape:
         }
 
 
-IDLE = {
-    "state": "idle", "seconds": 0.0, "least": 5.5, "enough": 30.0, "most": 60.0,
-    "calibrated": False, "refused": False, "text": "", "warnings": [],
-}  # fmt: skip
-SEEN = (
-    "uskin-curved: held 42 s; the arm moved (the force changed by 7 % within half a second). 14 of "
-    "31 features have a new scale, and 96 % of this handling is STABLE, 41 % before."
-)
-
-
 class Service:
-    """Fake service with its own port and thread.
-
-    Attributes:
-        panels: panels of the page; of a subclass.
-    """
-
-    panels = ()
+    """Fake service with its own port and thread."""
 
     def __init__(self, tape, token=None, speed=1.0, port=0):
         self.tape, self.token, self.speed, self.port = tape, token, speed, port
@@ -239,7 +222,6 @@ class Service:
         self.calls = []
         self.recording = None
         self.threshold = 0.5
-        self.calibration = dict(IDLE)
         self.patch = {}  # fields that replace those of every message
         self.notices = []
         self.muted = False
@@ -290,13 +272,6 @@ class Service:
         app.router.add_post("/api/v1/recording", self.start_recording)
         app.router.add_delete("/api/v1/recording", self.stop_recording)
         app.router.add_post("/api/v1/markers", self.marker)
-        app.router.add_post("/api/v1/calibration", self.start_calibration)
-        app.router.add_delete("/api/v1/calibration", self.end_calibration)
-        app.router.add_post("/api/v1/calibration/finish", self.finish_calibration)
-        app.router.add_get("/api/v1/calibration/model", self.get_model)
-        app.router.add_post("/api/v1/calibration/model", self.save_model)
-        for panel in self.panels:
-            app.router.add_static(f"/panels/{panel.name}", panel.folder)
         return app
 
     @web.middleware
@@ -320,7 +295,7 @@ class Service:
         return answer
 
     async def index(self, _):
-        return web.Response(text=page_with(self.panels), content_type="text/html")
+        return web.FileResponse(PAGE / "index.html")
 
     async def info(self, _):
         return web.json_response(self.tape.hello())
@@ -353,28 +328,6 @@ class Service:
     async def marker(self, _):
         return web.json_response({})
 
-    async def start_calibration(self, _):
-        self.calibration |= {"state": "recording", "seconds": 0.0, "text": "", "refused": False}
-        return web.json_response(self.calibration)
-
-    async def finish_calibration(self, _):
-        self.calibration |= {"state": "idle", "calibrated": True, "text": SEEN}
-        self.tape.model = "builtin:any, calibrated"
-        return web.json_response(self.calibration)
-
-    async def end_calibration(self, _):
-        undone = self.calibration["state"] == "idle"
-        self.calibration = IDLE | ({"text": "calibration undone"} if undone else {})
-        self.tape.model = "builtin:any"
-        return web.json_response(self.calibration)
-
-    async def get_model(self, _):
-        headers = {"Content-Disposition": 'attachment; filename="calibrated.json"'}
-        return web.json_response({"model": "calibrated"}, headers=headers)
-
-    async def save_model(self, _):
-        return web.json_response({"path": "recordings/model-20261123-081500.json"})
-
     async def live(self, request):
         socket = web.WebSocketResponse()
         await socket.prepare(request)
@@ -387,20 +340,15 @@ class Service:
             self.sockets.discard(socket)
         return socket
 
-    def fields(self):
-        """Fields that a subclass adds to every message."""
-        return {}
-
     async def play(self):
         while True:
             await asyncio.sleep(PERIOD)
             if self.muted:
                 continue
             start, self.at = self.at, self.at + PERIOD * self.speed
-            message = self.tape.message(start, self.at) | self.fields() | self.patch
+            message = self.tape.message(start, self.at) | self.patch
             message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
             message["notices"], self.notices = self.notices, []
-            message["calibration"] = self.calibration
             if self.recording:
                 self.recording["seconds"] += PERIOD
                 self.recording["n_bytes"] += 14_000

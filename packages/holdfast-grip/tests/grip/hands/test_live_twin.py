@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from holdfast.devices.sources.replay import PAUSE
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast_grip import FingerCommand, GripCommand, LoopState
@@ -66,19 +65,6 @@ def test_commands_for_other_fingers_or_a_closed_twin_are_refused():
 def test_the_effects_of_a_server_are_refused():
     with pytest.raises(ValueError, match="server=false expected"):
         LiveTwin("twin:?server=true")
-
-
-def test_a_loop_begins_the_grasp_again_after_a_pause(monkeypatch):
-    with LiveTwin(URI, speed=0, loop=True) as twin:
-        first = twin.read(0.0)
-        twin.read(0.0)
-        # The end of a grasp that is not simulated to its end here.
-        monkeypatch.setattr(type(twin.simulation), "is_over", True)
-        last = twin.simulation.time
-        assert not twin.ended
-        again = twin.read(0.0)
-    assert again.time == pytest.approx(last + PAUSE + first.time)
-    np.testing.assert_array_equal(again.samples["thumb"], first.samples["thumb"])
 
 
 def test_it_reports_the_joints_of_each_sample_once():

@@ -40,7 +40,6 @@ TIMES = [
     ("the loop ends", "500 ms"),
     ("the loop ends", "the next command"),
     ("`limit`", "the same command"),
-    ("`stopped`", TICK),
     ("`watchdog`", ms(watchdog.TIMEOUT)),
     ("`watchdog`", "at once"),
     ("the loop ends", f"the next heartbeat, within {TICK}"),

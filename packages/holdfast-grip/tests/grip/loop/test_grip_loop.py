@@ -3,13 +3,11 @@ import math
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding, scales
-from holdfast.contact import ContactState, HandEstimate
+from holdfast.contact import ContactState
 from holdfast_grip import (
     FingerCommand,
     GripCommand,
-    GripController,
     GripReason,
-    Limits,
     LoopState,
 )
 from holdfast_grip.errors import HandError
@@ -144,107 +142,6 @@ def test_a_controller_beyond_its_limits_is_stopped_by_the_guard(tape):
     assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 0.8 to 3 expected"]
 
 
-class TestStop:
-    @pytest.mark.parametrize("on_fault", ["hold", "open"])
-    def test_the_next_step_sends_the_safe_command(self, tape, on_fault):
-        controller, time = holding(on_fault=on_fault)
-        texts = []
-        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
-        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
-        held = scales(tape.commands[-1])
-        assert held["index"] > 1.1
-        loop.stop()
-        loop.step(hand(time, index=SLIPPING), time + 1e-4)  # sooner than the highest rate allows
-        sent = tape.commands[-1]
-        assert (sent.state, sent.reason) == (LoopState.FAULT, GripReason.STOPPED)
-        assert sent.release is (on_fault == "open")
-        assert scales(sent) == held
-        assert controller.state is LoopState.FAULT
-        assert texts[-1] == "grip FAULT (stopped)"
-
-    def test_it_lasts_whatever_the_estimates_are(self, tape):
-        controller, time = holding(recovery=0.0)
-        loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, time)
-        loop.stop()
-        stepped(loop, time, n=300, index=SLIPPING)
-        assert {command.reason for command in tape.commands[10:]} == {GripReason.STOPPED}
-        assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
-
-    def test_it_needs_no_data(self, tape):
-        beats = Beats()
-        loop = GripLoop(GripController(Limits(on_fault="open")), tape, armed=True, watchdog=beats)
-        loop.stop()
-        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
-        assert [command.release for command in tape.commands] == [True]
-        loop.step(HandEstimate(0.0, ContactState.UNKNOWN, {}), 0.0)
-        assert len(beats.commands) == 2
-
-    def test_a_grip_that_still_holds_goes_on_with_its_scales(self, tape):
-        controller, time = holding()
-        texts = []
-        loop = GripLoop(controller, tape, armed=True, log=lambda text, _: texts.append(text))
-        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
-        held = scales(tape.commands[-1])
-        assert held["index"] > 1.1
-        loop.stop()
-        time = stepped(loop, time)
-        loop.resume()
-        assert not loop.stopped
-        time = stepped(loop, time, n=1)
-        assert loop.last.state is LoopState.HOLD
-        assert scales(loop.last) == held
-        assert texts[-1] == "grip HOLD"
-        # Past the episode of the first step. The thumb carries half of all normal forces.
-        stepped(loop, time, n=120, thumb=SLIPPING)
-        assert scales(loop.last)["index"] > held["index"]
-
-    def test_without_contact_it_begins_from_idle(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
-        loop.stop()
-        gone = {name: {"state": ContactState.NO_CONTACT} for name in FINGERS}
-        time = stepped(loop, time, n=20, **gone)
-        loop.resume()
-        stepped(loop, time, n=20, **gone)
-        assert loop.last.state is LoopState.IDLE
-
-    def test_a_hand_that_opened_gets_no_command_until_it_holds_again(self, tape):
-        controller, time = holding(on_fault="open")
-        loop = GripLoop(controller, tape, armed=True)
-        with loop:
-            loop.stop()
-            time = stepped(loop, time)
-            loop.resume()
-            n = len(tape.commands)
-            time = stepped(loop, time, n=20)
-            assert loop.last.state is LoopState.IDLE
-            (last,) = tape.commands[n:]  # ends the grip of the hand
-            assert (last.state, last.release) == (LoopState.IDLE, True)
-        assert tape.commands[-1].release
-        stepped(loop, time, n=40)
-        assert tape.commands[-1].state is LoopState.HOLD
-        assert not tape.commands[-1].release
-
-    def test_resuming_what_was_not_stopped_changes_nothing(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
-        before = scales(loop.last)
-        loop.resume()
-        stepped(loop, time, n=1)
-        assert loop.last.state is not LoopState.IDLE
-        assert scales(loop.last) == pytest.approx(before, rel=0.05)
-
-
-def test_an_orderly_end_leaves_an_open_hand_open(tape):
-    controller, time = holding(on_fault="open")
-    with GripLoop(controller, tape, armed=True) as loop:
-        loop.stop()
-        stepped(loop, time)
-    assert tape.commands[-1].release
-
-
 def test_a_sample_that_is_late_by_more_than_an_update_is_no_fault(tape):
     controller, time = holding()
     loop = GripLoop(controller, tape)
@@ -272,18 +169,6 @@ def test_a_time_that_is_no_time_is_a_fault_and_is_forgotten(tape, given):
 class TestClock:
     """A clock of the source that jumps ahead, and comes back or does not."""
 
-    @pytest.mark.parametrize("on_fault", ["hold", "open"])
-    def test_one_stamp_from_the_future_is_a_fault_that_a_reset_ends(self, tape, on_fault):
-        controller, time = holding(on_fault=on_fault)
-        loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, time)
-        loop.step(hand(time + 100.0), time + 100.0)
-        assert (loop.last.state, loop.last.reason) == (LoopState.FAULT, GripReason.CLOCK)
-        time = stepped(loop, time, n=1)
-        loop.resume()
-        stepped(loop, time, n=60)
-        assert loop.last.state is LoopState.HOLD
-
     def test_with_hold_the_loop_recovers_from_it_by_itself(self, tape):
         controller, time = holding()
         loop = GripLoop(controller, tape, armed=True)
@@ -300,20 +185,6 @@ class TestClock:
         assert loop.last.reason is GripReason.CLOCK
         stepped(loop, time, n=100)
         assert loop.last.state is LoopState.HOLD
-
-    def test_a_clock_that_jumped_back_is_accepted_by_a_reset(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, stepped(loop, time), n=16, index=SLIPPING)
-        held = scales(loop.last)
-        time = stepped(loop, time - 100.0)
-        assert loop.last.state is LoopState.FAULT
-        loop.resume()
-        time = stepped(loop, time)
-        assert loop.last.state in (LoopState.HOLD, LoopState.RELAX)
-        # Past the episode of the first step. The thumb carries half of all normal forces.
-        stepped(loop, time, n=120, thumb=SLIPPING)
-        assert scales(loop.last)["index"] > held["index"]
 
     @pytest.mark.parametrize("on_fault", ["hold", "open"])
     def test_every_command_has_a_time(self, tape, on_fault):

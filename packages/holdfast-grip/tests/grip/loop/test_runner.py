@@ -1,17 +1,15 @@
 import math
-import threading
 import time as clocks
 from types import SimpleNamespace
 
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding
-from grip.loop.test_grip_loop import SLIPPING, Beats, Tape
+from grip.loop.test_grip_loop import SLIPPING, Tape
 from holdfast.contact import ContactState
 from holdfast.devices.sources import Arrival
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast_grip import GripController, GripReason, Limits, LoopState
-from holdfast_grip.errors import HandError
 from holdfast_grip.loop import runner as module
 from holdfast_grip.loop.grip_loop import GripLoop
 from holdfast_grip.loop.runner import LoopRunner
@@ -74,64 +72,6 @@ def test_an_estimate_that_is_later_than_a_tick_is_no_fault_of_the_clock(held, mo
     runner.process(update(hand(time + 1 / RATE)))
     runner.process(update(hand(time + 2 / RATE)))
     assert {command.state for command in tape.commands} == {LoopState.HOLD}
-
-
-def test_a_stop_does_not_wait_for_the_updates_in_the_queue(held):
-    runner, tape, time = held
-    for k in range(1, 50):
-        runner.put(update(hand(time + k / RATE, index=SLIPPING)))
-    stopped = runner.stop()
-    n = len(tape.commands)
-    runner.run(lambda: True)
-    assert stopped.result(0) is None
-    assert {command.reason for command in tape.commands[n:]} == {GripReason.STOPPED}
-
-
-def test_a_stop_needs_no_data_and_keeps_the_watchdog_quiet():
-    tape, beats = Tape(), Beats()
-    loop = GripLoop(GripController(Limits(on_fault="open")), tape, armed=True, watchdog=beats)
-    runner = LoopRunner(loop)
-    runner.process(None)
-    assert tape.commands == []
-    runner.stop()
-    for _ in range(5):
-        runner.process(None)
-    assert [command.release for command in tape.commands] == [True]
-    assert len(beats.commands) == 5
-
-
-def test_a_stop_wins_over_a_reset_before_it(held):
-    runner, tape, time = held
-    runner.stop()
-    runner.reset()
-    runner.stop()
-    runner.process(update(hand(time + 1 / RATE)))
-    assert tape.commands[-1].reason is GripReason.STOPPED
-    reset = runner.reset()
-    runner.process(update(hand(time + 2 / RATE)))
-    assert reset.done()
-    assert tape.commands[-1].state is LoopState.HOLD
-
-
-def test_a_hand_that_fails_fails_the_request_too(held):
-    runner, tape, _ = held
-    tape.fails = True
-    stopped = runner.stop()
-    with pytest.raises(HandError, match="no"):
-        runner.run(lambda: False)
-    with pytest.raises(HandError, match="no"):
-        stopped.result(0)
-
-
-def test_a_stop_from_another_thread_wakes_the_runner(held):
-    runner, tape, _ = held
-    over = threading.Event()
-    thread = threading.Thread(target=runner.run, args=(over.is_set,))
-    thread.start()
-    runner.stop().result(60)
-    over.set()
-    thread.join(60)
-    assert GripReason.STOPPED in {command.reason for command in tape.commands}
 
 
 @pytest.fixture
@@ -215,21 +155,3 @@ def test_a_stamp_that_is_no_number_gives_the_safe_command(held):
     last = tape.commands[-1]
     assert (last.state, last.reason) == (LoopState.FAULT, GripReason.CLOCK)
     assert math.isfinite(last.time)
-
-
-def test_a_request_that_nobody_waits_for_any_more_ends_no_loop(held):
-    runner, tape, time = held
-    stopped = runner.stop()
-    stopped.cancel()  # by the time-out of its HTTP request
-    runner.process(update(hand(time + 1 / RATE)))
-    assert tape.commands[-1].reason is GripReason.STOPPED
-
-
-def test_a_stop_is_sent_without_a_pace_and_without_samples():
-    tape = Tape()
-    controller, time = holding(on_fault="open")
-    runner = LoopRunner(GripLoop(controller, tape, armed=True), speed=0.0)
-    runner.process(update(hand(time)))
-    runner.stop()
-    runner.process(None)
-    assert tape.commands[-1].release

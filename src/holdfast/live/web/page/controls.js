@@ -9,8 +9,6 @@ const MAX_TOASTS = 4;
 const FLASH_TIME = 400; // [ms], dark and then bright
 // The first callback comes before the page is painted, the second one after it.
 const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-/** Why tare, thresholds and model cannot be changed while the hand is armed. */
-export const LOCKED = "The hand is armed: the tare, the thresholds and the model are locked";
 
 /** Show a short message; `kind` is "good" or "bad". */
 export function toast(text, kind) {
@@ -27,8 +25,6 @@ export class Controls {
     this.recording = null;
     this.canRecord = true;
     this.connected = false;
-    this.locked = false;
-    this.tareTitle = byId("tare").title;
     byId("tare").addEventListener("click", () => this.tare());
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
@@ -51,9 +47,6 @@ export class Controls {
     this.show();
   }
 
-  /** Lock the tare while the hand is armed; the service refuses it too. */
-  setLocked(locked) { this.locked = locked; }
-
   update(recording) {
     this.recording = recording ?? null;
     this.show();
@@ -61,8 +54,7 @@ export class Controls {
 
   show() {
     const button = byId("record"), r = this.recording;
-    byId("tare").disabled = !this.connected || this.locked;
-    byId("tare").title = this.locked ? LOCKED : this.tareTitle;
+    byId("tare").disabled = !this.connected;
     button.disabled = !this.connected || !this.canRecord;
     button.title = this.canRecord ? (r ? r.path : "Start or stop a recording (R)") : "This service does not record";
     button.setAttribute("aria-pressed", String(r !== null));
@@ -84,7 +76,6 @@ export class Controls {
   }
 
   tare() {
-    if (this.locked) return toast(LOCKED, "bad"); // by the key T
     return this.request(byId("tare"), async () => {
       await callService("POST", "tare");
       toast("Taking the tare: nothing may touch the fingers", "good");

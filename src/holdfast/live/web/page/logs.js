@@ -51,10 +51,10 @@ export class EventLog {
     this.slips.delete(finger);
   }
 
-  addMarker(time, text, kind = "marker") {
+  addMarker(time, text) {
     const label = make("span", "change", text);
     label.title = text;
-    this.addItem(time, make("b", "finger marked", kind), label);
+    this.addItem(time, make("b", "finger marked", "marker"), label);
   }
 
   addItem(time, ...parts) {

@@ -1,11 +1,9 @@
 // Connects the parts of the page: messages arrive at the service's pace, drawing follows the
 // browser's.
 
-import { callService } from "../web/api.js";
 import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
 import { fingerColour, onTheme } from "../web/theme.js";
 import { HandBanner, HealthLine, showAlert } from "./banner.js";
-import { CalibrationPanel } from "./calibration.js";
 import { Cards } from "./cards.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
@@ -21,8 +19,7 @@ const WINDOWS = [5, 10, 30, 60]; // [s]
 const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
 
 class Page {
-  /** @param kinds classes of the panels of plug-ins, by name. */
-  constructor(kinds) {
+  constructor() {
     this.banner = new HandBanner();
     this.health = new HealthLine(byId("health"));
     this.events = new EventLog(byId("events"));
@@ -31,12 +28,7 @@ class Page {
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
     this.threshold = new ThresholdPanel();
-    this.calibration = new CalibrationPanel(() => this.refreshModel());
     this.advised = new Set(); // advice that the list of notices has
-    this.panels = new Map(Object.entries(kinds).map(([name, Panel]) => [name, new Panel({
-      addEvent: (time, text) => this.events.addMarker(time, text, name),
-      addNotice: (text) => this.notices.add({ time: Date.now() / 1000, text }),
-    })]));
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
@@ -49,7 +41,7 @@ class Page {
     listenToKeys({
       " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
       m: () => this.controls.mark(), l: () => this.controls.flash(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
-      p: () => this.threshold.toggle(), c: () => this.calibration.press(), k: () => this.togglePause(),
+      p: () => this.threshold.toggle(), k: () => this.togglePause(),
       digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
     });
     onTheme(() => this.updateColours());
@@ -68,7 +60,7 @@ class Page {
     this.restarts = hello.source.startsWith("twin:"); // it pauses between two grasps
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls, this.threshold, this.calibration, ...this.panels.values()]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
     this.plots.start(hello, this.store);
     const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
     document.body.classList.toggle("has-slips", hasSlips);
@@ -76,18 +68,6 @@ class Page {
     this.fillFingers();
     this.showStream(hello);
     this.showAdvice(hello.advice ?? []);
-  }
-
-  /** Show the model that decides now; the samples stay. */
-  async refreshModel() {
-    try {
-      const hello = await callService("GET", "info");
-      for (const part of [this.banner, this.threshold]) part.start(hello);
-      this.plots.fingers = hello.fingers;
-      this.showStream(hello);
-    } catch {
-      // The next connection has it.
-    }
   }
 
   showAdvice(texts) {
@@ -103,9 +83,7 @@ class Page {
     this.status.silent = Boolean(message.health?.silent);
     this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
     this.plots.thresholds = message.thresholds ?? {};
-    for (const part of [this.controls, this.threshold, this.calibration]) part.setLocked(Boolean(message.locked));
     this.threshold.update(message.thresholds);
-    this.calibration.update(message.calibration);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
     const { ended, silent } = this.status;
@@ -120,7 +98,6 @@ class Page {
     for (const notice of message.notices ?? []) this.notices.add(notice);
     if (message.health) this.health.update(message.health);
     this.controls.update(message.recording);
-    for (const [name, panel] of this.panels) panel.update(message[name]);
     this.showLink();
     this.dirty = true;
   }
@@ -131,8 +108,6 @@ class Page {
     Object.assign(this.status, { link, reason });
     this.controls.setConnected(link === "open");
     this.threshold.setConnected(link === "open");
-    this.calibration.setConnected(link === "open");
-    for (const panel of this.panels.values()) panel.setLink(link);
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -240,11 +215,5 @@ class Page {
   }
 }
 
-async function importPanels() {
-  const names = document.body.dataset.panels.split(" ").filter(Boolean);
-  const modules = await Promise.all(names.map((name) => import(`../panels/${name}/panel.js`)));
-  return Object.fromEntries(names.map((name, k) => [name, modules[k].Panel]));
-}
-
 // For the browser's console, and for tests.
-window.holdfast = new Page(await importPanels());
+window.holdfast = new Page();

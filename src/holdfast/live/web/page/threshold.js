@@ -2,7 +2,7 @@
 
 import { callService } from "../web/api.js";
 import { byId, setText } from "../web/dom.js";
-import { LOCKED, toast } from "./controls.js";
+import { toast } from "./controls.js";
 import { number, share } from "./format.js";
 
 /** Return the point of the validation that is nearest to a threshold; null if there is none. */
@@ -39,7 +39,6 @@ export class ThresholdPanel {
     this.values = [];
     this.moving = false; // the user moves the slider, or the service has not answered yet
     this.connected = false;
-    this.locked = false;
     byId("threshold-toggle").addEventListener("click", () => this.toggle());
     this.slider.addEventListener("input", () => { this.moving = true; this.showValue([this.chosen]); });
     this.slider.addEventListener("change", () => this.send("POST", { value: this.chosen }));
@@ -63,9 +62,6 @@ export class ThresholdPanel {
     this.show();
   }
 
-  /** Lock the thresholds while the hand is armed; the service refuses changes too. */
-  setLocked(locked) { this.locked = locked; }
-
   /** Show the thresholds of the fingers of the live detector. */
   update(thresholds) {
     const values = Object.values(thresholds ?? {});
@@ -85,14 +81,12 @@ export class ThresholdPanel {
     this.slider.setAttribute("aria-valuetext", word);
     const errors = values.length === 1 || new Set(values).size === 1
       ? expectation(this.points, values[0]) : "The fingers have different thresholds.";
-    setText(byId("threshold-expected"), this.locked ? LOCKED : errors);
+    setText(byId("threshold-expected"), errors);
   }
 
   show() {
-    const fixed = !this.connected || this.locked;
-    this.slider.disabled = fixed;
-    this.slider.title = this.locked ? LOCKED : "";
-    byId("threshold-own").disabled = fixed || this.values.every((value, k) => value === this.own[k]);
+    this.slider.disabled = !this.connected;
+    byId("threshold-own").disabled = !this.connected || this.values.every((value, k) => value === this.own[k]);
   }
 
   async send(method, body) {
