@@ -57,6 +57,7 @@ REMOVED: dict[str, dict[str, str]] = {
             ("teach --page", "teach --host", "teach --port", "teach --token", "teach --token-file"),
             "holdfast teach SOURCE -o NAME.json in a terminal",
         ),
+        "hold --min-scale": "none; a law never goes below 0.8 of the first force",
         "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {
@@ -95,8 +96,8 @@ REMOVED: dict[str, dict[str, str]] = {
     },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
-`verbs`, `options`, `sources`, ..., `labels`, formats of labels, and `rules`, the rules of heads in
-model files; an option has its verb before it, as in "serve --hand"."""
+`verbs`, `options`, `sources`, ..., and `labels` (formats of labels), `rules` (of heads in model
+files), `files` and `plugins` (kinds of them). An option has its verb before it: "serve --hand"."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

@@ -39,7 +39,6 @@ class GripSettings:
     Attributes:
         hand: URI of the hand.
         max_scale: highest force scale; None for the default of `Limits`.
-        min_scale: lowest force scale; None for the default of `Limits`.
     """
 
     hand: Annotated[
@@ -56,11 +55,6 @@ class GripSettings:
     max_scale: Annotated[
         float | None,
         typer.Option(help="Largest multiple of the first force.", show_default="3.0"),
-    ] = None
-    min_scale: Annotated[
-        float | None,
-        typer.Option(help="Smallest multiple of the first force.", show_default="0.8"),
-        RARE,
     ] = None
     max_force: Annotated[
         float | None,
@@ -96,9 +90,8 @@ class GripSettings:
         """
         from holdfast_grip import Limits
 
-        scales = {"min_scale": self.min_scale, "max_scale": self.max_scale}
-        wanted = {name: scale for name, scale in scales.items() if scale is not None}
-        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **wanted)
+        scale = {} if self.max_scale is None else {"max_scale": self.max_scale}
+        return Limits(max_force=self.max_force, on_fault=self.on_fault.value, **scale)
 
 
 def find_source_and_hand(source: str, hand: str, *, speed: float) -> "tuple[Source, HandDevice]":

@@ -92,11 +92,10 @@ def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monke
 
 def test_the_limits_are_those_of_the_trials():
     given = signature(spread_groups(hold)).parameters
-    names = ("max_scale", "min_scale", "max_force", "on_fault")
+    names = ("max_scale", "max_force", "on_fault")
     settings = GripSettings("", **{name: given[name].default for name in names})
     assert settings.limits() == LIMITS == Limits()
-    shown = {name: get_args(given[name].annotation)[1].show_default for name in names[:2]}
-    assert shown == {"max_scale": str(LIMITS.max_scale), "min_scale": str(LIMITS.min_scale)}
+    assert get_args(given["max_scale"].annotation)[1].show_default == str(LIMITS.max_scale)
 
 
 def test_the_published_trials_have_these_limits():
