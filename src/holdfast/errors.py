@@ -32,11 +32,10 @@ EXTRA_MODULES = {
     "serial": ("serial",),
     "hdf5": ("h5py",),
     "onnx": ("onnx", "onnxruntime"),
-    "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
 EXTRA_PURPOSES = {
-    "all": "all of the others but deep",
+    "all": "all of the others",
     "parquet": "recordings as Parquet files",
     "pandas": "estimates and features as a DataFrame",
     "train": "holdfast train, evaluate and tune",
@@ -46,7 +45,6 @@ EXTRA_PURPOSES = {
     "video": "holdfast label markers, record --camera, and stickers in videos",
     "onnx": "classifiers as ONNX files",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
-    "deep": "the neural network of holdfast study",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
@@ -82,7 +80,7 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "options": ("serve --ros2", "serve --ros1", "play --hand"),
     },
     LABORATORY: {
-        "verbs": ("bench", "study", "trial"),
+        "verbs": ("study", "trial"),
         "simulators": ("randomized",),
         "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
     },
@@ -261,7 +259,7 @@ def package_versions() -> dict[str, dict[str, str | None]]:
             except PackageNotFoundError:
                 group[match["package"]] = None
     # "all" requires other extras of this package, not packages
-    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra not in ("all", "deep"))
+    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra != "all")
     return versions | {"all": {name: found for group in others for name, found in group.items()}}
 
 

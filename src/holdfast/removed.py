@@ -4,8 +4,12 @@ LAST_COMMIT = "f7d623e5"
 """Commit of version 0.3.0, which still has all of it."""
 
 REMOVED: dict[str, dict[str, str]] = {
-    "verbs": {},
-    "options": {},
+    "verbs": {
+        "bench": "python benchmarks/speed.py --json",
+        "study data": "no replacement",
+        "study score": "no replacement",
+    },
+    "options": {"study --benchmark": "no replacement"},
     "sources": {},
     "importers": {},
     "exporters": {},

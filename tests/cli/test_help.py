@@ -28,7 +28,7 @@ SHOWN = {
     "export": "--like --sensor --fingers --float --format --model --fps --force --json",
     "datasets": "--only --yes --force --json",
     "trial": "--out --laws --model --quick --n --plant --impacts --jobs --force --json",
-    "study": "--out --twin --quick --full --jobs --tare --benchmark --force --json",
+    "study": "--out --twin --quick --full --jobs --tare --force --json",
     "label auto": "--tare --poses --track --video --author --dry-run --force --json",
     "label compare": "--annotator --json",
     "label audit": "--page --author --json",

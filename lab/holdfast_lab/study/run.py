@@ -8,36 +8,18 @@ from typing import Any, Protocol
 from holdfast.parallel import Engine
 from holdfast_lab.report.environment import machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, to_json
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study import environment
-from holdfast_lab.study.citation import (
-    METHODS_FILE,
-    REFERENCES_FILE,
-    bibliography,
-    methods_text,
-)
-from holdfast_lab.study.comparison import (
-    all_methods,
-    real_recordings,
-    sensitivity,
-    shipped,
-    slip_table,
-)
+from holdfast_lab.study.comparison import all_methods, real_recordings, shipped, slip_table
+from holdfast_lab.study.comparison.jobs import method_titles
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.paper import (
-    attribution,
-    claims,
-    experiments,
-    label_tables,
-    paper_tables,
-    verdicts,
-)
+from holdfast_lab.study.paper import experiment_tables, experiments, paper_tables
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.study.sections import PartOutput, report_sections
 from holdfast_lab.tasks import Notify, ShowProgress, Task, TaskRunner
 
-STUDY = ReportKind("study", "study.json", (METHODS_FILE, REFERENCES_FILE))
+STUDY = ReportKind("study", "study.json")
 TITLE = "Slip and disturbance at the fingertips: the study"
 
 
@@ -60,18 +42,14 @@ class StudyPart(Protocol):
 PARTS: Mapping[str, StudyPart] = {
     "paper": paper_tables,
     "experiments": experiments,
-    "verdicts": verdicts,
-    "labels": label_tables,
-    "attribution": attribution,
-    "claims": claims,
+    "experiment tables": experiment_tables,
     "comparison": all_methods,
     "slips": slip_table,
     "shipped": shipped,
-    "sensitivity": sensitivity,
     "real": real_recordings,
 }
 """The parts of the study, by name."""
-ONLY_FULL = ("labels", "attribution", "claims", "slips", "shipped", "sensitivity")
+ONLY_FULL = ("slips", "shipped")
 """Those beyond the paper's tables, events and splits. A quick study has them at a small size."""
 
 
@@ -134,16 +112,14 @@ def run_study(
         "tasks": len(tasks),
         "left_out": [*left_out, *whole_hand_note(plan), *full_note(skipped)],
     }
-    sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
+    sources = [f"{title}: {METHODS[name].source}." for name, title in method_titles(plan).items()]
+    notes = environment.run_notes(summary)
+    sections = report_sections(outputs, notes, sources, twin=plan.main.is_simulated)
     # Those of the sections, because they carry the note on the twin.
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
     facts = environment.report_facts(summary)
-    others = {
-        METHODS_FILE: methods_text(plan, summary, tables).encode(),
-        REFERENCES_FILE: bibliography(summary).encode(),
-    }
-    write_report(out, STUDY, TITLE, facts, sections, document, others=others, force=force)
+    write_report(out, STUDY, TITLE, facts, sections, document, force=force)
     return tables
 
 

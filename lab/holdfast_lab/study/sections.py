@@ -8,8 +8,8 @@ from typing import NamedTuple, TypeVar
 
 import msgspec
 
-from holdfast_lab.report.html_report import SUMMARY, ReportFigure, Section, join_lines
 from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.report.sections import SUMMARY, ReportFigure, Section, join_lines
 
 E = TypeVar("E", ResultTable, ReportFigure)
 
@@ -83,31 +83,8 @@ If no recording is of a failed grasp, the figure of experiment 1 is missing.""",
 recordings, by fits that did not use them. Experiment 1: how much of a failed grasp is called
 unstable. Experiment 2: the time from the lock to the first stable estimate, and which
 disturbances are detected. The last table lists single disturbances.""",
-        "verdicts",
+        "experiment tables",
         ("experiment_1", "experiment_2", "experiment_phases", "disturbances"),
-    ),
-    SectionOutline(
-        "What the distance to the paper is due to",
-        """The paper's method on the reference recordings, and then with one thing switched at a
-time: the labels, the disturbances, the classifier, the noise, the window. A difference is due to
-that one thing. What no line explains stays open: the paper's data are not published.""",
-        "attribution",
-    ),
-    SectionOutline(
-        "Labels, and what the sensor shows",
-        """Labels are a choice. Exact labels come from the simulated forces; a person draws them
-from the plot of the force. The first table trains and tests on both. The second table counts
-unstable samples in which nothing at the sensor changes by more than its noise. No detector can
-find those within its window, so they set a ceiling.""",
-        "labels",
-        ("labels", "ceiling"),
-    ),
-    SectionOutline(
-        "Claims that the paper does not test",
-        """The paper states both, without a measurement. The expected direction and size were
-written into the program before the first run. The verdict follows from the value and its
-interval by a fixed rule, which is printed below the table.""",
-        "claims",
     ),
     SectionOutline(
         "Where the paper disagrees with itself",
@@ -134,7 +111,7 @@ on these data, even if the intervals of the two methods overlap. A method for fi
 for the whole hand solve different tasks. The table of hands evaluates all of them on the same
 task.""",
         "comparison",
-        ("strongest", "methods", "hands", "cost"),
+        ("strongest", "methods", "hands"),
     ),
     SectionOutline(
         "Events: detection delay and false alarms",
@@ -165,20 +142,11 @@ reports no slip. The last line of each group does nothing.""",
         ("models", "slip_speeds"),
     ),
     SectionOutline(
-        "Where the errors are",
-        """The same decisions by group: by phase of the experiment, by grip force and by direction
-of the push. The last table shows whether the probabilities are right: whether of 100 samples with
-a probability of 0.8 about 80 are stable. The Brier score is the mean squared error of the
-probability; 0 is best. The paper makes claims about grip force and direction, but does not test
-them.""",
+        "Probabilities",
+        """Whether of 100 samples with a probability of 0.8 about 80 are stable. The Brier score is
+the mean squared error of the probability; 0 is best.""",
         "",
-        ("phases", "force", "grip", "directions", "reliability"),
-    ),
-    SectionOutline(
-        "Sensitivity",
-        """What happens if one condition changes: the noise of the readings, or the sampling
-rate. Be careful with a method whose curve falls early: it may fail on another hand.""",
-        "sensitivity",
+        ("reliability",),
     ),
     SectionOutline(
         "Real recordings",
@@ -209,13 +177,18 @@ events."""
 
 
 def report_sections(
-    outputs: Mapping[str, PartOutput], run_notes: Sequence[str], *, twin: bool
+    outputs: Mapping[str, PartOutput],
+    run_notes: Sequence[str],
+    sources: Sequence[str],
+    *,
+    twin: bool,
 ) -> list[Section]:
     """Return the sections of the report: summary, run, results, limits of the twin.
 
     Args:
         outputs: tables and figures, by part.
         run_notes: sentences on what was run and what was left out.
+        sources: of the methods, and what differs from them here.
         twin: whether the recordings, except the real ones, are of the twin.
     """
     summary = summary_text(table for output in outputs.values() for table in output.tables)
@@ -236,6 +209,7 @@ def report_sections(
                     for table in tables
                 ]
             sections.append(Section(outline.title, join_lines(outline.text), tables, figures))
+    sections.append(Section("Methods", "\n".join(f"- {source}" for source in sources)))
     if twin:
         sections.append(Section("What the twin cannot show", join_lines(LIMITS_TEXT)))
     return sections

@@ -4,7 +4,6 @@ import time
 from pathlib import Path
 from typing import Any
 
-from holdfast.errors import OutputError
 from holdfast.parallel import Engine
 from holdfast_lab.report.environment import fact_texts, machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
@@ -91,7 +90,7 @@ def run_trials(
 
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
-    """Return courses and film of a trial; the film is made in this process."""
+    """Return the courses of a trial."""
     laws = (BASELINE_LAW, OWN_LAW)
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
@@ -103,11 +102,4 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
         f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
         f"{trial.load.kind.value}{when}."
     )
-    task = plan.film_task(number, laws)
-    runner.notify("rendering the film of one trial")
-    try:
-        # In this process: it needs a back end of MuJoCo, which a worker may lack.
-        film = TaskRunner(runner.folder).run([task])[task.name]
-    except OutputError as cause:
-        return Example(what, courses, reason=str(cause))
-    return Example(what, courses, film)
+    return Example(what, courses)

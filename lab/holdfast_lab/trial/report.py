@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from holdfast_lab.report.html_report import SUMMARY, ReportFilm, Section, join_lines
 from holdfast_lab.report.result_tables import number_text
+from holdfast_lab.report.sections import SUMMARY, ReportFigure, Section, join_lines
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import BASELINE_LAW, OWN_LAW, TrialResults
 from holdfast_lab.trial.figures import (
@@ -69,23 +69,18 @@ and no taxel is dead;
 - other grips: all trials have the same hand in the same precision grip with three or four fingers,
 at two times the least force. A power grip behaves otherwise;
 - what people do: the loads are drawn from stated ranges, and come one at a time."""
-NO_FILM = "There is no film: {reason}."
 
 
 class Example(NamedTuple):
-    """The trial of the film.
+    """The trial that is shown.
 
     Attributes:
         what: sentence that describes the trial.
         courses: its course by law.
-        film: WebP file; empty without a film.
-        reason: why there is no film.
     """
 
     what: str
     courses: Mapping[str, TrialCourse]
-    film: bytes = b""
-    reason: str = ""
 
 
 def report_sections(
@@ -96,7 +91,7 @@ def report_sections(
     Args:
         document: contents of `trial.json`.
         results: of all trials, by law.
-        example: the trial of the film, if there is one.
+        example: the trial that is shown, if there is one.
     """
     paired = [paired_table(document, other) for other in document["paired"]]
     text = join_lines(WHAT.format(grip=document["first_grip"]))
@@ -180,24 +175,12 @@ def _text(row: Summary, column: LawColumn) -> str:
     return f"{text} ({low} to {high})"
 
 
-def _example(example: Example | None) -> tuple[str, list[Any], list[Any]]:
+def _example(example: Example | None) -> tuple[str, list[Any], list[ReportFigure]]:
     """Return text, tables and figures of the section of the example."""
     rule = (
         "It is chosen by a rule: the first of the set that "
         f"{BASELINE_LAW} loses and {OWN_LAW} holds."
     )
     if example is None:
-        return (
-            f"{NO_FILM.format(reason='no trial is such, or one of the laws was not run')} {rule}",
-            [],
-            [],
-        )
-    figures: list[Any] = [course_figure(example.courses, example.what)]
-    if not example.film:
-        return f"{example.what} {rule}\n\n{NO_FILM.format(reason=example.reason)}", [], figures
-    caption = (
-        f"The same trial with {BASELINE_LAW} (above) and {OWN_LAW} (below), in real time. "
-        f"{example.what} "
-        "Red arrows: forces of the fingertips on the object. Violet arrow: the load."
-    )
-    return f"{example.what} {rule}", [], [ReportFilm("film", caption, example.film), *figures]
+        return f"There is no such trial, or one of the laws was not run. {rule}", [], []
+    return f"{example.what} {rule}", [], [course_figure(example.courses, example.what)]

@@ -54,7 +54,6 @@ VERB_GROUPS = {
     "Laboratory": {
         "trial": "Compare laws of grip force on the twin, all on the same trials.",
         "study": "Repeat the experiments of the paper, and run further ones.",
-        "bench": "Measure the speed of the features and of the detector.",
     },
 }
 """Verbs in the order of the help, with the first line of their docstrings. Those that are plug-ins

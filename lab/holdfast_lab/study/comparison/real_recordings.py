@@ -8,9 +8,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from holdfast_interop.importers import uskin_pick_move
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast_lab.study.comparison.jobs import NETWORK, Results, method_titles
+from holdfast_lab.report.sections import ReportFigure
+from holdfast_lab.study.comparison.jobs import Results, method_titles
 from holdfast_lab.study.comparison.real_counts import (
     AUC,
     COUNT_DIGITS,
@@ -110,13 +110,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
         for making in MODELS
     ]
     methods = [
-        Task(
-            _task_name(name),
-            method_estimates,
-            (name, plan.real, plan.seed),
-            result,
-            (120.0 if name == NETWORK else 5.0),
-        )
+        Task(_task_name(name), method_estimates, (name, plan.real, plan.seed), result, cost=5.0)
         for name in real_methods(plan, plan.real)
     ]
     return [read, *models, *methods]

@@ -22,10 +22,9 @@ from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.teaching import teach
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.rows import RowKeys, count_row, quantile_row, ratio_row
-from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
@@ -91,7 +90,7 @@ Counted = dict[str, list[ModelCounts]]
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return a task for each model; none without recordings of the twin and other objects."""
     tests = {role: plan.corpora[role] for role in TESTED if role in plan.corpora}
-    if not tests or not has_truth(plan.main.load()[0]):
+    if not tests or not plan.main.has_truth:
         return []
     made = [
         Task(f"shipped/{name}", shipped_counts, (name, tests), Counted, cost=10.0)

@@ -13,8 +13,8 @@ from holdfast.metrics.slips import (
     SlipMetrics,
 )
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
 from holdfast_lab.study.comparison.rows import RowKeys
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob
@@ -87,7 +87,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
     for name in names:
         # By object where objects are known; the split by recording only stands in for it.
         job = EvaluationJob(
-            name, plan.main, ("object", "recording"), tests, effort=method_effort(plan, name),
+            name, plan.main, ("object", "recording"), tests, effort=method_effort(plan),
             seed=plan.seed, compared=names, slips=True,
         )  # fmt: skip
         cost = TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0)

@@ -13,8 +13,8 @@ from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.plots.time_series import FingerSeries, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.evaluation.fitted_method import MethodTraining
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import METHODS
