@@ -2,12 +2,12 @@ import json
 
 import numpy as np
 import pytest
+from holdfast_lab.speed import benchmark, pywt_loop, scipy_features, tsflex_task
 
 from holdfast.cli import main
 from holdfast.cli.terminal.console import print_json
 from holdfast.features import DEFAULT_WINDOW, haar_features
 from holdfast_lab import speed
-from holdfast_lab.speed import benchmark, pywt_loop, scipy_features, tsflex_task
 
 pytestmark = pytest.mark.slow
 

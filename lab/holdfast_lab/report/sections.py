@@ -11,8 +11,6 @@ from holdfast_lab.report.table_layouts import escape_markdown, to_markdown
 
 PNG_RESOLUTION = 200
 """Of a PNG [dots per inch]."""
-SUMMARY = "Summary"
-"""Title of the section that comes first."""
 
 
 class ReportFigure(NamedTuple):
@@ -87,13 +85,3 @@ def check_names(sections: Sequence[Section]) -> None:
     for name in figures:
         if not FILE_NAME.fullmatch(name):
             raise ValueError(f"a figure's name is letters, digits, - and _; {name!r} given")
-
-
-def join_lines(text: str) -> str:
-    """Join the lines of each paragraph and of each item of a list."""
-    paragraphs = []
-    for part in text.split("\n\n"):
-        breaks = ("\n" if line.startswith("- ") else " " for line in part.splitlines())
-        lines = zip(breaks, part.splitlines(), strict=True)
-        paragraphs.append("".join(f"{before}{line}" for before, line in lines).strip())
-    return "\n\n".join(paragraphs)

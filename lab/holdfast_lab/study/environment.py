@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from holdfast_lab.report.environment import fact_texts
 from holdfast_lab.study.plan import StudyPlan
 
 ROLES = {
@@ -43,20 +42,11 @@ def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
     }
 
 
-def report_facts(summary: Mapping[str, Any]) -> dict[str, str]:
-    """Return the head of the report, from the contents of `study.json`."""
-    return {
-        f"data, {role}": f"{each['recordings']} recordings, {each['samples']:,} samples of single "
-        f"fingers, {each['rate']:.0f} Hz, {', '.join(each['fingers'])}; digest "
-        f"{each['digest'][:12]}"
-        for role, each in summary["data"].items()
-    } | fact_texts(summary)
-
-
 def run_notes(summary: Mapping[str, Any]) -> list[str]:
     """Return sentences on what was run and what was left out."""
     notes = [
-        f"{role}: {corpus['recordings']} recordings; {ROLES.get(role, 'others')}."
+        f"{role}: {corpus['recordings']} recordings, {corpus['samples']:,} samples of single "
+        f"fingers at {corpus['rate']:.0f} Hz; {ROLES.get(role, 'others')}."
         for role, corpus in summary["data"].items()
     ]
     if summary["quick"]:

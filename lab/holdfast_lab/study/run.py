@@ -1,12 +1,12 @@
 """A whole study: run the tasks of all parts, then write tables, figures and the report."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 from holdfast.parallel import Engine
-from holdfast_lab.report.environment import machine, versions
+from holdfast_lab.report.environment import fact_texts, machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
 from holdfast_lab.report.result_tables import ResultTable, to_json
 from holdfast_lab.report.sections import ReportFigure
@@ -23,30 +23,31 @@ STUDY = ReportKind("study", "study.json")
 TITLE = "Slip and disturbance at the fingertips: the study"
 
 
-class StudyPart(Protocol):
-    """A module of the study: its tasks, and the tables and figures of their results."""
-
-    def tasks(self, plan: StudyPlan) -> list[Task]:
-        """Return what has to be computed."""
-        ...
-
-    def tables(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
-        """Return the tables of the results."""
-        ...
-
-    def figures(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-        """Return the figures of the results."""
-        ...
+Results = Mapping[str, Any]
 
 
-PARTS: Mapping[str, StudyPart] = {
-    "paper": paper_tables,
-    "experiments": experiments,
-    "experiment tables": experiment_tables,
-    "comparison": all_methods,
-    "slips": slip_table,
-    "shipped": shipped,
-    "real": real_recordings,
+class StudyPart(NamedTuple):
+    """A part of the study.
+
+    Attributes:
+        tasks: function that returns what has to be computed.
+        tables: function that returns the tables of the results.
+        figures: function that returns the figures of the results.
+    """
+
+    tasks: Callable[[StudyPlan], list[Task]]
+    tables: Callable[[StudyPlan, Results], list[ResultTable]] = lambda *_: []
+    figures: Callable[[StudyPlan, Results], list[ReportFigure]] = lambda *_: []
+
+
+PARTS = {
+    "paper": StudyPart(paper_tables.tasks, paper_tables.tables, paper_tables.figures),
+    "experiments": StudyPart(experiments.tasks, figures=experiments.figures),
+    "experiment tables": StudyPart(experiment_tables.tasks, experiment_tables.tables),
+    "comparison": StudyPart(all_methods.tasks, all_methods.tables, all_methods.figures),
+    "slips": StudyPart(slip_table.tasks, slip_table.tables),
+    "shipped": StudyPart(shipped.tasks, shipped.tables),
+    "real": StudyPart(real_recordings.tasks, real_recordings.tables),
 }
 """The parts of the study, by name."""
 ONLY_FULL = ("slips", "shipped")
@@ -118,8 +119,7 @@ def run_study(
     # Those of the sections, because they carry the note on the twin.
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
-    facts = environment.report_facts(summary)
-    write_report(out, STUDY, TITLE, facts, sections, document, force=force)
+    write_report(out, STUDY, TITLE, fact_texts(summary), sections, document, force=force)
     return tables
 
 

@@ -1,10 +1,10 @@
 import json
 
 import pytest
+from holdfast_lab.report.html_report import ReportFigure, Section
 
 from holdfast.errors import OutputError
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
-from holdfast_lab.report.html_report import ReportFigure, Section
 
 from .test_html_report import drawn, sections
 

@@ -1,4 +1,5 @@
 from holdfast_lab.report.html_report import ReportFigure
+
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.study.paper.published import discrepancies
 from holdfast_lab.study.sections import (

@@ -1,11 +1,5 @@
 import numpy as np
 import pytest
-
-from holdfast.errors import OutputError
-from holdfast.twin.loads import Load, LoadKind
-from holdfast.twin.simulation import Grasp
-from holdfast_grip import LoopState
-from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, Instant, TrialCourse, follow
 from holdfast_lab.trial.film import (
     BELOW,
     FILM_FONT_SIZE,
@@ -17,6 +11,12 @@ from holdfast_lab.trial.film import (
     film,
     load_text,
 )
+
+from holdfast.errors import OutputError
+from holdfast.twin.loads import Load, LoadKind
+from holdfast.twin.simulation import Grasp
+from holdfast_grip import LoopState
+from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, Instant, TrialCourse, follow
 from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial, draw_trial
 

@@ -10,10 +10,10 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from holdfast_lab.report.html_report import Section
 
 from holdfast.errors import OutputError
 from holdfast.parallel import Engine
-from holdfast_lab.report.html_report import Section
 from holdfast_lab.trial import experiment
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.course import TrialCourse

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from holdfast_lab.source_digest import PACKAGES, _closure
 
 import holdfast
 from holdfast.errors import ModelError
 from holdfast.model import Model
 from holdfast_grip import laws
-from holdfast_lab.source_digest import PACKAGES, _closure
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.plan import SIMULATION, TrialPlan, run_numbered
 

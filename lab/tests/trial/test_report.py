@@ -2,12 +2,12 @@ import re
 
 import msgspec
 import pytest
-
 from holdfast_lab.report.html_report import html_report
+from holdfast_lab.trial.report import Example, report_sections, summary_text
+
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import document_of, example_of
 from holdfast_lab.trial.plan import TrialPlan
-from holdfast_lab.trial.report import Example, report_sections, summary_text
 
 from .example_results import results_of
 

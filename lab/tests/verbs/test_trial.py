@@ -2,10 +2,10 @@ import json
 
 import msgspec
 import pytest
+from holdfast_lab.report.html_report import Section
 
 from holdfast.cli import main
 from holdfast.model import Model
-from holdfast_lab.report.html_report import Section
 from holdfast_lab.trial import experiment, plan
 from holdfast_lab.trial.course import TrialCourse
 from trial.example_results import invented

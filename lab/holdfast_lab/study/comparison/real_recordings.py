@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from holdfast_interop.importers import uskin_pick_move
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.jobs import Results, method_titles
 from holdfast_lab.study.comparison.real_counts import (
     AUC,
@@ -141,12 +140,6 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
         finger_auc_table(by_line, plan.seed),
         pair_table(lines, results[LABELS], estimates, plan.seed),
     ]
-
-
-def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
-    """Return no figure."""
-    del plan, results
-    return []
 
 
 def real_methods(plan: StudyPlan, real: Corpus) -> dict[str, str]:

@@ -23,7 +23,6 @@ from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.teaching import teach
 from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.rows import RowKeys, count_row, quantile_row, ratio_row
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
@@ -136,12 +135,6 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         ResultTable("slip_speeds", "Delay by the speed of the slip", speed_note, by_speed,
                     ("on", "model", "speed [mm/s]"), digits=3, digits_of=digits),
     ]  # fmt: skip
-
-
-def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-    """Return no figures."""
-    del plan, results
-    return []
 
 
 def model_title(task: str) -> str:

@@ -24,7 +24,6 @@ from holdfast.metrics.masks import join_runs, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.jobs import short_title
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.evaluate_method import (
@@ -137,12 +136,6 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     makers = (failed_table, disturbed_table, phase_table, single_table)
     made = [make(by_method, plan.seed) for make in makers] if by_method else []
     return [table for table in made if table.rows]
-
-
-def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-    """Return no figures; those of the experiments show single recordings."""
-    del plan, results
-    return []
 
 
 def grasp_outcomes(

@@ -1,6 +1,7 @@
 import msgspec
 import numpy as np
 import pytest
+from holdfast_lab.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 
 from holdfast_lab.report.result_tables import to_json
 from holdfast_lab.report.table_layouts import to_html, to_latex
@@ -15,7 +16,6 @@ from holdfast_lab.study.comparison import (
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.comparison.sample_tables import force_quartiles
-from holdfast_lab.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus

@@ -2,11 +2,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.recordings import Truth
-from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
 from holdfast_lab.study.methods import HAND
 from study.example_recordings import GLITCH, PUSH, truth_of
 

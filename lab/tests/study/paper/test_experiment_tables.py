@@ -3,12 +3,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from holdfast_lab.study.paper.verdicts import find_disturbances, stable_after_lock
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.metrics import FingerDecisions
 from holdfast.recordings import Truth
 from holdfast_lab.study.paper import verdicts
-from holdfast_lab.study.paper.verdicts import find_disturbances, stable_after_lock
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import recording_with_truth, save_all, truth_of
 
