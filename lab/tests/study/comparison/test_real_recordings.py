@@ -153,8 +153,4 @@ def test_the_caveat_of_the_box_is_given_for_the_box_only(corpus, made, monkeypat
 
 def test_without_real_recordings_there_is_nothing_to_do(corpus):
     plan = StudyPlan({"main": corpus})
-    assert (
-        real_recordings.tasks(plan),
-        real_recordings.tables(plan, {}),
-        real_recordings.figures(plan, {}),
-    ) == ([], [], [])
+    assert (real_recordings.tasks(plan), real_recordings.tables(plan, {})) == ([], [])

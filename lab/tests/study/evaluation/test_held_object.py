@@ -2,13 +2,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from holdfast_lab.study.evaluation.error_breakdown import break_down_errors, count_glitches
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
-from holdfast.recordings import Truth
+from holdfast_lab.study.evaluation.held_object import count_glitches, held_errors
 from holdfast_lab.study.methods import HAND
-from study.example_recordings import GLITCH, PUSH, truth_of
+from study.example_recordings import GLITCH, truth_of
 
 TIMES = np.arange(1725) / 150
 GROUND_TRUTH = truth_of(TIMES, ("thumb", "index"))
@@ -21,52 +20,14 @@ def decided(states, names=("thumb", "index")):
     return Decisions("one", dict.fromkeys(names, finger), finger)
 
 
-def breakdown_of(states, truth=None, names=("thumb", "index")):
-    truth = truth or truth_of(TIMES, ("thumb", "index"))
-    return break_down_errors(truth, decided(states, names))
-
-
-def test_everything_called_stable():
-    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8))
-    assert found.phases["disturbed"] == (360, 360)
-    assert found.phases["locked"] == (1800, 0)
-    assert found.phases["free"][0] == found.phases["free"][1] == 2 * (225 + 225)
-    assert found.disturbances == [("down", (358, 358))]
-    assert [(grip.stable, grip.not_stable) for grip in found.grips] == [((900, 0), (180, 180))] * 2
-    assert [grip.force for grip in found.grips] == pytest.approx([2.0, 2.0])
-
-
-def test_samples_without_a_decision_do_not_count():
-    states = np.where(TIMES < 6.0 - 1e-9, UNKNOWN, UNSTABLE).astype(np.int8)
-    found = breakdown_of(states)
-    assert found.phases["disturbed"] == (2 * 75, 0)
-    assert found.phases["locked"] == (2 * 450, 2 * 450)
-    assert (found.grips[0].stable, found.grips[0].not_stable) == ((450, 450), (75, 0))
-
-
-@pytest.mark.parametrize(
-    ("force", "direction"),
-    [((0, 0, 1), "up"), ((0.2, -1, 0), "left"), ((1, 1, 0), "oblique"), ((3, 0, 1), "towards")],
-)
-def test_directions(force, direction):
-    truth = truth_of(TIMES, ("thumb", "index"))
-    outside = np.outer(np.linalg.norm(truth.hand["outside_force"], axis=1), force)
-    turned = Truth(TIMES, {**truth.hand, "outside_force": outside}, truth.fingers)
-    assert force != PUSH
-    ((found, _),) = breakdown_of(np.full(1725, STABLE), turned).disturbances
-    assert found == direction
-
-
-def test_a_whole_hand_method_has_phases_and_disturbances_but_no_grips():
-    found = breakdown_of(np.full(1725, STABLE, dtype=np.int8), names=(HAND,))
-    assert found.phases["disturbed"] == (180, 180)
-    assert found.disturbances == [("down", (179, 179))]
-    assert found.grips == []
-
-
-def test_the_breakdown_is_empty_without_a_truth():
-    found = break_down_errors(None, decided(np.full(1725, STABLE)))
-    assert (found.phases, found.grips, found.disturbances) == ({}, [], [])
+@pytest.mark.parametrize(("names", "n"), [(("thumb", "index"), 2), ((HAND,), 1)])
+def test_errors_count_while_the_object_is_held(names, n):
+    """Held for 7.2 s, disturbed for 1.2 s of them; a finger or a hand decides."""
+    stable = np.full(1725, STABLE, dtype=np.int8)
+    assert held_errors(GROUND_TRUTH, decided(stable, names)) == (1080 * n, 180 * n)
+    late = np.where(TIMES < 6.0 - 1e-9, UNKNOWN, UNSTABLE).astype(np.int8)
+    assert held_errors(GROUND_TRUTH, decided(late, names)) == (525 * n, 450 * n)
+    assert held_errors(None, decided(stable, names)) == (0, 0)
 
 
 def sliding(*spans, speed=0.01):
