@@ -39,8 +39,8 @@ COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",)
 """What the folder of a comparison holds."""
 TRIAL_TITLE = "Grip laws against each other on the twin"
 MEANING = (
-    "Results of a simulation: docs/study/grip.md says what each number means and what the twin "
-    "cannot show."
+    "Results of a simulation: docs/study/grip.md says what each number means, docs/twin.md what "
+    "the twin cannot show."
 )
 RULE = f"It is the first of the set that {BASELINE_LAW} loses and {OWN_LAW} holds."
 """How the trial that is shown is chosen."""
