@@ -38,7 +38,7 @@ from holdfast_lab.trial.trials import draw_trial
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
 """What the folder of a comparison holds."""
 TRIAL_TITLE = "Grip laws against each other on the twin"
-MEANING = (
+WHAT_NUMBERS_MEAN = (
     "Results of a simulation: docs/study/grip.md says what each number means, docs/twin.md what "
     "the twin cannot show."
 )
@@ -155,7 +155,7 @@ def report_sections(
         shown = Section(shown.title, f"{example.what} {RULE}", [], [figure])
     paired = [paired_table(document, other) for other in document["paired"]]
     return [
-        Section("All laws", MEANING, law_tables(document), [trade_off_figure(document)]),
+        Section("All laws", WHAT_NUMBERS_MEAN, law_tables(document), [trade_off_figure(document)]),
         Section("In pairs", "", [table for table in paired if table.rows]),
         Section("Slip and reaction", "", [], [distribution_figure(results)]),
         Section(
