@@ -94,12 +94,12 @@ def test_stored_results_are_not_computed_again(done, plan, tmp_path):
     out = shutil.copytree(done[0], tmp_path / "out")
     with pytest.raises(OutputError, match="already holds a study: choose another name, or give"):
         run_study(plan, out)
-    kept = {path.name: path.read_bytes() for path in (out / "work").iterdir()}
+    kept = {path.name: path.read_bytes() for path in (out / "work").glob("*.msgpack")}
     (out / "data").mkdir()
     messages = []
     run_study(plan, out, notify=messages.append, force=True)
     assert messages[0] == f"{len(kept)} of {len(kept)} tasks are already done"
-    assert {path.name: path.read_bytes() for path in (out / "work").iterdir()} == kept
+    assert {path.name: path.read_bytes() for path in (out / "work").glob("*.msgpack")} == kept
     assert (out / "data").is_dir()
     assert summary(out)["tables"] == summary(done[0])["tables"]
 

@@ -117,14 +117,14 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
     for split in ("object", "recording"):
         names = [recording.name for recording in evaluations[split].hand.recordings]
         assert names == list(corpus.recordings)
-    assert len(evaluations["others"].breakdown) == 3
+    assert len(evaluations["others"].held) == 3
     assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
-def test_without_a_truth_there_are_no_glitches_and_no_phases(evaluations):
+def test_without_a_truth_there_are_no_glitches_and_nothing_is_held(evaluations):
     others = evaluations["others"]
     assert all(not glitches.distances for glitches in others.glitches)
-    assert all(not each.phases for each in others.breakdown)
+    assert others.held == [(0, 0)] * 3
     assert all(len(glitches.distances) == 1 for glitches in evaluations["recording"].glitches)
 
 
@@ -181,7 +181,7 @@ def test_recordings_of_one_class_are_evaluated_too(tmp_path, recordings):
     found = evaluate_method(EvaluationJob("zhang", scan_corpus("main", folder), effort=EFFORT))[
         "recording"
     ]
-    assert len(found.breakdown) == 4
+    assert len(found.held) == 4
 
 
 def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):
