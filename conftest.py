@@ -40,7 +40,7 @@ SLOW_FOLDERS = ("tests/cli/label", "tests/docs", "tests/examples")
 """Folders without quick tests."""
 SLOW_FILE = re.compile(
     r"^\s*(?:import|from) (?:asyncio|concurrent|cyclonedds|distributed|http|multiprocessing"
-    r"|playwright|serial|signal|socket|subprocess|threading|torch|urllib)\b"
+    r"|playwright|serial|signal|socket|subprocess|threading|urllib)\b"
     r"|^pytestmark = .*\bslow\b",
     re.MULTILINE,
 )

@@ -24,8 +24,6 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from holdfast_lab.study.citation import compares_methods
-
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("study.md", "study-changes.md", "study/paper.md", "study/real-data.md")
 FIGURES = ("experiment-1.png", "experiment-2.png")
@@ -34,6 +32,8 @@ MISSING = "–"
 NUMBERS = ("ours", "paper", "difference")
 VALUES = (*NUMBERS, "n", "low", "high")
 """Columns of a table that are no keys."""
+COMPARED_KEYS = {"method", "baseline", "measure"}
+"""Keys of rows that name what is compared."""
 DIGITS = 6
 """Significant digits of the numbers from which the pages are written."""
 
@@ -218,7 +218,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
     figures = Figures(summary["tables"])
     public = ("cell", "any_cell", "grid", "has", "ratio", "share_stable")
     names = {name: getattr(figures, name) for name in public}
-    names["compares_methods"] = compares_methods
+    names["compares_methods"] = lambda keys: not COMPARED_KEYS.isdisjoint(keys)
     return {
         page: environment.get_template(f"{Path(page).name}.j2").render(study=summary, **names)
         for page in PAGES

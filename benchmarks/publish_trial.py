@@ -3,7 +3,7 @@
     python benchmarks/publish_trial.py publish MILD HARD [--before NOW BEFORE] [--set NAME FOLDER]
     python benchmarks/publish_trial.py render
 
-`publish` copies trial.json, the tables and trials as CSV, the film and some figures from the
+`publish` copies trial.json, the tables and trials as CSV, and some figures from the
 folders of finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
 page. MILD and HARD are runs of the two plants. Each --before gives a run of today and one of an
 earlier law on the same trials, in which `holdfast` is compared in pairs, and each --set a run with
@@ -29,8 +29,8 @@ from holdfast_lab.trial.summary import Summary, compare, summarize
 
 DOCS = Path(__file__).parents[1] / "docs" / "study"
 PAGE = "grip-trials.md"
-FIGURES = ("film.webp", "force.png", "distributions.png", "course.png")
-"""Figures that are copied; a run without a film has some of them only."""
+FIGURES = ("force.png", "distributions.png", "course.png")
+"""Figures that are copied; a run without an example has some of them only."""
 NOT_PUBLISHED = ("trials",)
 """Parts of trial.json that are published as CSV only."""
 SETS = "sets.json"

@@ -63,7 +63,7 @@ def test_without_an_installation_the_package_is_named(monkeypatch):
 
 
 def test_a_missing_extra_can_be_pickled():
-    failure = errors.MissingExtra("torch", "deep")
+    failure = errors.MissingExtra("h5py", "hdf5")
     assert str(pickle.loads(pickle.dumps(failure))) == str(failure)
 
 

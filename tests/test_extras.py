@@ -166,7 +166,7 @@ def test_the_table_of_modules_fits_the_metadata():
     packages = {name.removeprefix("holdfast-") for name in PACKAGE_PARTS} - {"lab"}
     assert declared == {*EXTRA_MODULES, *packages, "all"}
     (every,) = (text for text in metadata.requires("holdfast") if text.startswith("holdfast["))
-    assert set(re.split(r"[\[\],]", every)[1:-1]) == declared - {"all", "deep"}
+    assert set(re.split(r"[\[\],]", every)[1:-1]) == declared - {"all"}
     assert every.endswith('; extra == "all"')
 
 

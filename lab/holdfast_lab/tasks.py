@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from hashlib import sha256
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -12,10 +14,15 @@ from holdfast.cluster import one_thread
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
 from holdfast.parallel import Engine
-from holdfast_lab.source_digest import source_digest
 
 T = TypeVar("T")
 Notify = Callable[[str], None]
+
+PACKAGES = ("holdfast", "holdfast_grip", "holdfast_interop", "holdfast_lab")
+"""Packages that make results; other packages are pinned by the lock file."""
+SOURCE_SUFFIXES = (".py", ".csv", ".json", ".toml", ".c", ".h")
+VERSION_FILE = "version"
+"""Name of the file beside the stored results with the digest of the source that made them."""
 
 
 class Task(NamedTuple):
@@ -27,8 +34,6 @@ class Task(NamedTuple):
         arguments: values that msgspec can encode: Structs, numbers, text, None, lists of them.
         result: type of the result, for decoding by msgspec.
         cost: expected duration, in a unit that is the same for all tasks.
-        version: digest of what else the result depends on; empty for the modules that the module
-            of the function imports.
     """
 
     name: str
@@ -36,7 +41,6 @@ class Task(NamedTuple):
     arguments: tuple[Any, ...]
     result: Any
     cost: float = 1.0
-    version: str = ""
 
 
 class ShowProgress(Protocol):
@@ -60,8 +64,8 @@ class ShowProgress(Protocol):
 class TaskRunner:
     """Runs tasks and stores the result of each in its own file.
 
-    The name of the file is a digest of what the result depends on: the modules that make it or
-    the version of the task, the function and the arguments. A stored result is therefore never
+    The name of the file is a digest of the function and the arguments. All results of the folder
+    are of one source: those of another one are removed. A stored result is therefore never
     outdated, and a command that is stopped loses only the tasks that were running.
 
     Attributes:
@@ -89,6 +93,7 @@ class TaskRunner:
         folder = self._path("").parent
         try:
             folder.mkdir(parents=True, exist_ok=True)
+            self._remove_outdated(folder)
         except OSError as cause:
             raise OutputError(f"cannot write {folder}: {cause.strerror}") from cause
         by_key = {keys[task.name]: task for task in tasks}
@@ -120,6 +125,18 @@ class TaskRunner:
             write_whole(self._path(keys[name]), msgpack.encode(stored), force=True)
             yield by_name[name], result
 
+    def _remove_outdated(self, folder: Path) -> None:
+        """Remove the results of another source."""
+        version, source = folder / VERSION_FILE, source_digest()
+        if version.is_file() and version.read_text("utf-8") == source:
+            return
+        outdated = list(folder.glob("*.msgpack"))
+        if outdated:
+            self.notify(f"{folder} has results of another version: they are computed again")
+        for path in outdated:
+            path.unlink()
+        write_whole(version, source.encode(), force=True)
+
     def _path(self, key: str) -> Path:
         return self.folder / "work" / f"{key}.msgpack"
 
@@ -141,13 +158,28 @@ class StoredResult(Struct, frozen=True):
     result: Raw
 
 
+@lru_cache
+def source_digest() -> str:
+    """Return a digest of the source of all packages that make results, and of their data."""
+    digest = sha256()
+    for package in PACKAGES:
+        spec = find_spec(package)
+        folder = Path(str(spec.origin)).parent if spec is not None else Path()
+        for path in sorted(folder.rglob("*")):
+            if path.suffix in SOURCE_SUFFIXES:
+                name = path.relative_to(folder).as_posix()
+                digest.update(
+                    f"{package}/{name} {sha256(path.read_bytes()).hexdigest()}\n".encode()
+                )
+    return digest.hexdigest()
+
+
 def _keys(tasks: Sequence[Task]) -> dict[str, str]:
     """Return a digest of what each result depends on, by the name of the task."""
     keys = {}
     for task in tasks:
         function = f"{task.function.__module__}.{task.function.__qualname__}"
-        version = task.version or source_digest((task.function.__module__,))
-        contents = (version, function, task.arguments)
+        contents = (function, task.arguments)
         # Mappings are encoded in the order of their keys, not in the order of their making.
         keys[task.name] = sha256(msgpack.encode(contents, order="deterministic")).hexdigest()
     if len(keys) < len(tasks):

@@ -76,7 +76,7 @@ def runs(tmp_path):
         (tmp_path / plant / "trial.json").write_bytes(msgspec.json.encode(document))
         (tmp_path / plant / "trials.csv").write_text("a")
         (tmp_path / plant / "tables/laws.csv").write_text("b")
-        (tmp_path / plant / "figures/film.webp").write_bytes(b"c")
+        (tmp_path / plant / "figures/course.png").write_bytes(b"c")
     return tmp_path
 
 
@@ -84,7 +84,7 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     docs, mild, hard = runs / "docs", runs / "mild", runs / "hard"
     script.publish(mild, docs, hard, [(mild, mild)], {"impacts": hard})
     assert {path.name for path in (docs / "grip").iterdir()} == {
-        "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "film.webp",
+        "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "course.png",
         f"{script.PAGE}.j2",
     }  # fmt: skip
     assert "trials" not in json.loads((docs / "grip/trial.json").read_text())
@@ -93,7 +93,7 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     assert "12 trials of each plant with each law, seed 0 (mild) and 0 (hard)" in page
     assert "| `fixed` | 63.6<br><sub>" in page
     assert "On 11 fresh trials of the mild plant `holdfast` dropped 0.0 % of" in page
-    assert "(grip/film.webp)" in page and "(grip/force.png)" not in page
+    assert "(grip/course.png)" in page and "(grip/force.png)" not in page
     assert "| `builtin:any` | mild | 11 | 0.0 |" in page
     assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
 

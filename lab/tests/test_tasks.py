@@ -201,11 +201,34 @@ def test_other_arguments_or_another_function_are_another_result(tmp_path):
     assert len(kept(tmp_path)) == 3
 
 
-def test_another_source_is_another_result(tmp_path, log, monkeypatch):
-    TaskRunner(tmp_path).run(noted_tasks(log, 2))
-    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
-    TaskRunner(tmp_path).run(noted_tasks(log, 2))
+def test_results_of_another_version_are_computed_again_and_one_line_says_so(
+    tmp_path, log, monkeypatch
+):
+    (tmp_path / "work").mkdir()
+    (tmp_path / "work" / "old.msgpack").write_bytes(b"of 0.3.0")
+    messages = []
+    runner = TaskRunner(tmp_path, notify=messages.append)
+    runner.run(noted_tasks(log, 2))
+    monkeypatch.setattr(work, "source_digest", lambda: "another")
+    runner.run(noted_tasks(log, 2))
     assert set(calls(log).values()) == {2}
+    line = f"{tmp_path / 'work'} has results of another version: they are computed again"
+    assert messages == [line, line]
+    assert len(kept(tmp_path)) == 2
+
+
+def test_the_version_is_that_of_every_source_file(tmp_path, monkeypatch):
+    (tmp_path / "toy" / "part").mkdir(parents=True)
+    for name in ("__init__.py", "part/step.c", "part/table.csv"):
+        (tmp_path / "toy" / name).write_text("1\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(work, "PACKAGES", ("toy",))
+    found = {work.source_digest.__wrapped__()}
+    for name in ("__init__.py", "part/step.c", "part/table.csv", "part/new.py"):
+        (tmp_path / "toy" / name).write_text("2\n")
+        found.add(work.source_digest.__wrapped__())
+    (tmp_path / "toy" / "part" / "step.pyc").write_text("2\n")
+    assert len(found) == 5 and work.source_digest.__wrapped__() in found
 
 
 def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
@@ -214,18 +237,6 @@ def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
         EngineError, match=r"^figure/\d: the version of holdfast of its worker diff"
     ):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
-
-
-def test_a_task_may_have_a_version_of_its_own(tmp_path, log, monkeypatch):
-    def run(version):
-        return TaskRunner(tmp_path).run([Task("a", noted, (1, str(log)), int, version=version)])
-
-    assert run("first") == {"a": 1}
-    monkeypatch.setattr(work, "source_digest", lambda *_: "another")
-    run("first")
-    assert calls(log) == {"1": 1}
-    run("second")
-    assert calls(log) == {"1": 2}
 
 
 def test_the_same_call_under_two_names_is_made_once(tmp_path, log):

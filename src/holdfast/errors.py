@@ -31,11 +31,10 @@ EXTRA_MODULES = {
     "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
-    "deep": ("torch",),
 }
 """Modules that each extra of `pyproject.toml` installs and that holdfast imports."""
 EXTRA_PURPOSES = {
-    "all": "all of the others but deep",
+    "all": "all of the others",
     "parquet": "recordings as Parquet files",
     "pandas": "estimates and features as a DataFrame",
     "train": "holdfast train, evaluate and tune",
@@ -44,7 +43,6 @@ EXTRA_PURPOSES = {
     "label": "holdfast label",
     "video": "holdfast label markers, record --camera, and stickers in videos",
     "cluster": "a Dask cluster, --engine dask:ADDRESS",
-    "deep": "the neural network of holdfast study",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
@@ -66,7 +64,7 @@ PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
         "options": ("serve --ros2",),
     },
     LABORATORY: {
-        "verbs": ("bench", "study", "trial"),
+        "verbs": ("study", "trial"),
         "simulators": ("randomized",),
         "options": ("simulate --randomize", "simulate --grasps", "simulate --measured"),
     },
@@ -244,7 +242,7 @@ def package_versions() -> dict[str, dict[str, str | None]]:
             except PackageNotFoundError:
                 group[match["package"]] = None
     # "all" requires other extras of this package, not packages
-    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra not in ("all", "deep"))
+    others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra != "all")
     return versions | {"all": {name: found for group in others for name, found in group.items()}}
 
 

@@ -10,13 +10,16 @@ WRITTEN_OUT = (
     "write MODEL, URI and --ignore out, as in holdfast detect builtin:any "
     '"xela://auto?fingers=1:thumb,2:index" --ignore index:7'
 )
-NONE = "nothing but that commit"
+NONE = "nothing takes its place"
 
 REMOVED: dict[str, dict[str, str]] = {
     "verbs": {
         "label audit": AUDIT,
         "label compare": COMPARE,
-        "datasets score": "use holdfast evaluate MODEL RECORDINGS",
+        "datasets score": "holdfast evaluate MODEL RECORDINGS",
+        "bench": "python benchmarks/speed.py --json",
+        "study data": NONE,
+        "study score": NONE,
     },
     "options": {
         "label --auto": "holdfast label auto RULE RECORDINGS",
@@ -58,6 +61,7 @@ REMOVED: dict[str, dict[str, str]] = {
             "holdfast teach SOURCE -o NAME.json in a terminal",
         ),
         "hold --min-scale": "none; a law never goes below 0.8 of the first force",
+        "study --benchmark": NONE,
         "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {

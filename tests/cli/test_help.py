@@ -28,7 +28,7 @@ SHOWN = {
     "export": "--like --sensor --fingers --float --format --fps --model --force --json",
     "datasets": "--only --force --json",
     "trial": "--out --laws --model --quick --n --plant --impacts --jobs --force --json",
-    "study": "--out --twin --quick --full --jobs --tare --benchmark --force --json",
+    "study": "--out --twin --quick --full --jobs --tare --force --json",
     "label auto": "--tare --poses --track --video --author --dry-run --force --json",
 }
 """Options that the help of a verb shows; that of all other verbs shows all."""

@@ -18,7 +18,7 @@ def test_pyplot_is_not_imported():
     """pyplot keeps every figure that it makes until it is closed."""
     program = (
         "import sys; from holdfast_lab.figures import curves, dots, experiment\n"
-        "curves.draw_lines({}, 'x'); dots.draw_dots({})\n"
+        "curves.draw_lines({}, 'x', per_row=2); dots.draw_dots({})\n"
         "assert 'matplotlib.pyplot' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", program], check=True)

@@ -414,20 +414,6 @@ class TestGlitches:
         np.testing.assert_array_equal(none.modules["thumb"].readings, wanted)
 
 
-def test_a_grasp_can_have_no_noise_but_rounding(held):
-    quiet = made(replace(Grasp("can", 1, 1), noise=0.0))
-    assert quiet.metadata["noise"] == 0.0 and "noise" not in held.metadata
-    np.testing.assert_array_equal(
-        quiet.truth.fingers["thumb"]["contact_force"], held.truth.fingers["thumb"]["contact_force"]
-    )
-    rest = [
-        np.diff(np.asarray(each.modules["thumb"].readings[:75], dtype=float), axis=0).std()
-        for each in (held, quiet)
-    ]
-    assert rest[0] == pytest.approx(0.9 * np.sqrt(2), rel=0.1)
-    assert rest[1] < 0.2
-
-
 def label_causes(recording, finger):
     """Return the cause of the label of each sample, "" without one."""
     module = recording.modules[finger]

@@ -49,9 +49,7 @@ class PlottedCurve(NamedTuple):
 
 
 @default_settings()
-def draw_lines(
-    groups: Mapping[str, Mapping[str, PlottedCurve]], x: str, *, log: bool = False, per_row: int = 3
-) -> Figure:
+def draw_lines(groups: Mapping[str, Mapping[str, PlottedCurve]], x: str, *, per_row: int) -> Figure:
     """Draw the curves of several methods with bands of their intervals, in panels.
 
     A curve called "the paper" is black and dashed.
@@ -59,24 +57,19 @@ def draw_lines(
     Args:
         groups: by label of a panel's y axis with its unit: by method, its curve.
         x: label of the x axis, with its unit.
-        log: whether x is logarithmic.
         per_row: panels in a row.
     """
     figure, grid = panels(len(groups), per_row, 2.3)
     styles = series_styles(chain.from_iterable(groups.values()))
     for axes, (y, curves) in zip(grid, groups.items(), strict=True):
-        if log:
-            axes.set_xscale("log")
         axes.grid(color=FAINT, linewidth=0.5)
         for name, curve in curves.items():
             _draw_curve(axes, curve, styles[name])
-        # Few values of x all get a tick; a logarithmic axis has plain numbers, not powers of ten.
+        # Few values of x all get a tick.
         values = sorted({float(value) for curve in curves.values() for value in curve.x})
         if 0 < len(values) <= MAX_TICKS:
             axes.set_xticks(values, [f"{value:g}" for value in values])
             axes.xaxis.set_minor_locator(NullLocator())
-        elif log:
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         add_labels(axes, x, y)
     add_legend(figure, legend_handles(styles, groups.values()), per_row=5)
     return figure

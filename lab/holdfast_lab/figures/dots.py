@@ -7,13 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from holdfast.plots import COLOURS
 from holdfast.plots.style import (
     FAINT,
-    INK,
-    PAPER,
     SeriesStyle,
     add_labels,
     add_legend,
@@ -29,12 +26,11 @@ from holdfast.sensors.types import Array
 
 
 class IntervalEstimate(NamedTuple):
-    """A value, its interval and the value of the paper; NaN or None if unknown."""
+    """A value and its interval; NaN or None if unknown."""
 
     value: float | None
     low: float | None = None
     high: float | None = None
-    paper: float | None = None
 
 
 @default_settings()
@@ -44,8 +40,7 @@ def draw_dots(
     """Draw a dot with an interval for each method; the highest of the first panel is on top.
 
     Args:
-        groups: by label of a panel's x axis, "accuracy by object [%]": by method, its value;
-            the paper's value is a hollow diamond.
+        groups: by label of a panel's x axis, "accuracy by object [%]": by method, its value.
         strong: methods whose names are bold.
     """
     # By the value in the first panel, the lowest first; those without one are below.
@@ -69,10 +64,6 @@ def draw_dots(
     grid[0].set_ylim(-0.7, len(names) - 0.3)
     for name, label in zip(names, grid[0].get_yticklabels(), strict=True):
         label.set_fontweight("bold" if name in strong else "normal")
-    if any(value.paper is not None for values in groups.values() for value in values.values()):
-        diamond = Line2D([], [], color=INK, marker="D", markerfacecolor="white", linestyle="")
-        diamond.set(label=PAPER, markersize=4.5)
-        add_legend(figure, [diamond])
     return figure
 
 
@@ -117,10 +108,6 @@ def _draw_dot(axes: Axes, row: int, estimate: IntervalEstimate, *, bold: bool) -
         linewidth=1.3,
     )  # fmt: skip
     axes.plot(value, row, "o", color=colour, markersize=4.5)
-    if estimate.paper is not None:
-        axes.plot(
-            estimate.paper, row, "D", color=INK, markerfacecolor="white", markersize=4.5, zorder=1.9
-        )
 
 
 def _draw_intervals(

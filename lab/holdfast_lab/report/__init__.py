@@ -1,1 +1,1 @@
-"""Tables, the HTML report and the folder of a study."""
+"""Tables, the report and the folder of a study."""

@@ -11,7 +11,7 @@ from holdfast.threads import usable_processors
 
 REPORTED_PACKAGES = (
     "holdfast", "numpy", "scipy", "scikit-learn", "optuna", "mujoco", "msgspec",
-    "matplotlib", "torch",
+    "matplotlib",
 )  # fmt: skip
 GIB = 2**30
 

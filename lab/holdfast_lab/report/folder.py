@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import msgspec
 
 from holdfast.errors import OutputError
-from holdfast_lab.report.html_report import Section, html_report
-from holdfast_lab.report.result_tables import to_csv, to_json
-from holdfast_lab.report.table_layouts import to_latex, to_markdown
+from holdfast_lab.report.result_tables import to_csv
+from holdfast_lab.report.sections import Section, check_names, markdown_report, png_of
+from holdfast_lab.report.table_layouts import to_markdown
 
 TEMPORARY = ".report."
 """First letters of the name of a temporary folder."""
@@ -34,21 +34,21 @@ class ReportKind(NamedTuple):
     @property
     def outputs(self) -> tuple[str, ...]:
         """Names of all that is written; the summary comes last."""
-        return ("tables", "figures", *self.others, "report.html", self.summary)
+        return ("tables", "figures", *self.others, "report.md", self.summary)
 
 
 def write_report(
     out: str | Path,
     kind: ReportKind,
     title: str,
-    facts: Mapping[str, object],
+    facts: Mapping[str, str],
     sections: Sequence[Section],
     summary: Mapping[str, Any],
     *,
     others: Mapping[str, bytes] | None = None,
     force: bool = False,
 ) -> None:
-    """Write `report.html`, the summary, and each table and figure; all of them or none.
+    """Write `report.md`, the summary, and each table and figure; all of them or none.
 
     The files are first written to a temporary folder. `OUT/work` and `OUT/data` do not change.
 
@@ -68,6 +68,7 @@ def write_report(
     """
     target = Path(out)
     check_output_folder(target, kind, force=force)
+    check_names(sections)
     try:
         target.mkdir(exist_ok=True)
         # Inside the target: files are only renamed at the end, which works within one disk.
@@ -75,8 +76,10 @@ def write_report(
             new, old = Path(name, "new"), Path(name, "old")
             new.mkdir()
             old.mkdir()
-            (new / "report.html").write_text(html_report(title, facts, sections), "utf-8")
-            (new / kind.summary).write_bytes(_json(summary))
+            report = markdown_report(title, facts, sections)
+            (new / "report.md").write_text(report, "utf-8", newline="")
+            document = msgspec.json.format(msgspec.json.encode(summary), indent=1)
+            (new / kind.summary).write_bytes(document + b"\n")
             for other, data in (others or {}).items():
                 (new / other).write_bytes(data)
             _write_tables_and_figures(new, sections)
@@ -126,21 +129,8 @@ def _write_tables_and_figures(folder: Path, sections: Sequence[Section]) -> None
     figures.mkdir()
     for section in sections:
         for table in section.tables:
-            document = {
-                "name": table.name,
-                "title": table.title,
-                "note": table.note,
-                "rows": to_json(table),
-            }
-            (tables / f"{table.name}.json").write_bytes(_json(document))
             # RFC 4180 ends lines by CR LF; without `newline` Windows would write CR CR LF.
             (tables / f"{table.name}.csv").write_text(to_csv(table), encoding="utf-8", newline="")
-            (tables / f"{table.name}.tex").write_text(to_latex(table), encoding="utf-8")
             (tables / f"{table.name}.md").write_text(to_markdown(table), encoding="utf-8")
         for figure in section.figures:
-            for suffix, data in figure.files().items():
-                (figures / f"{figure.name}.{suffix}").write_bytes(data)
-
-
-def _json(value: object) -> bytes:
-    return msgspec.json.format(msgspec.json.encode(value), indent=1) + b"\n"
+            (figures / f"{figure.name}.png").write_bytes(png_of(figure.figure))

@@ -1,16 +1,9 @@
-"""Tables of results on the terminal: the main ones of a study, and the scores of a submission."""
+"""The main tables of a study on the terminal."""
 
 from msgspec import structs
 
 from holdfast.cli.terminal.console import print_line, print_table
-from holdfast_lab.report.result_tables import (
-    MISSING,
-    ResultTable,
-    Row,
-    digits_of,
-    number_text,
-    pivot,
-)
+from holdfast_lab.report.result_tables import ResultTable, Row, digits_of, number_text, pivot
 
 PRINTED_COLUMNS: dict[str, tuple[str, ...]] = {
     "confusion": (),
@@ -63,26 +56,3 @@ def printed_rows(table: ResultTable) -> ResultTable:
         and row.keys.get("a glitch is", "an event") == "an event"
     ]
     return structs.replace(table, rows=rows)
-
-
-def print_score_table(table: ResultTable) -> None:
-    """Print a table with a line for each of its figures, and the interval of each value."""
-    grid = pivot(table)
-    print_line(table.title)
-    lines = []
-    for column, name in enumerate(grid.columns):
-        cells = [line.cells[column] for line in grid.lines]
-        digits = digits_of(table, name)
-        lines.append([name, *(_with_interval(cell, digits) for cell in cells)])
-    print_table(("", *(", ".join(line.heads) for line in grid.lines)), lines)
-    print_line()
-
-
-def _with_interval(row: Row | None, digits: int) -> str:
-    if row is None:
-        return MISSING
-    value = number_text(row.ours, digits)
-    if row.interval is None:
-        return value
-    low, high = (number_text(end, digits) for end in row.interval)
-    return f"{value} ({low} to {high})"

@@ -33,7 +33,6 @@ class TwinCorpus(NamedTuple):
         other_objects: use another set of objects.
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
         repeats: grasps of each object and case; None for `N_REPEATS`.
-        noise: rms of a reading at rest [count]; None for that of the sensor.
         cases: 1 (held), 2 (held and disturbed), or both.
         faults: troubles of the skins, as in `--faults`.
     """
@@ -43,7 +42,6 @@ class TwinCorpus(NamedTuple):
     other_objects: bool = False
     glitch_rate: float | None = None
     repeats: int | None = None
-    noise: float | None = None
     cases: str = "1,2"
     faults: str = ""
 
@@ -61,8 +59,6 @@ TWIN_CORPORA = {
 }
 """Corpora of the paper's tables, of events and of splits."""
 FULL_CORPORA = TWIN_CORPORA | {
-    "finger": TwinCorpus("finger-reference", repeats=2),
-    "noiseless": TwinCorpus(noise=0.0, repeats=2),
     "aged": TwinCorpus(other_objects=True, seed_offset=3, cases="2", repeats=3,
                        faults="invented-months=4"),
     "impacts": TwinCorpus("coupled", other_objects=True, seed_offset=3, cases="2", repeats=3),
@@ -157,7 +153,7 @@ def simulate_corpus(
     table = OTHER_OBJECTS if corpus.other_objects else None
     seed += corpus.seed_offset
     grasps = [
-        replace(grasp, glitch_rate=corpus.glitch_rate, noise=corpus.noise)
+        replace(grasp, glitch_rate=corpus.glitch_rate)
         for grasp in twin_recordings.plan_grasps(
             "", corpus.cases, repeats, corpus.profile, seed, table=table, faults=corpus.faults
         )

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from holdfast_lab.report.environment import fact_texts
 from holdfast_lab.study.plan import StudyPlan
 
 ROLES = {
@@ -13,8 +12,6 @@ ROLES = {
     "others": "objects that are not used for training",
     "gentle": "a gentler profile of the twin",
     "vigorous": "a more vigorous profile of the twin",
-    "finger": "the protocol of holdfast 0.1, in which only a finger pushes",
-    "noiseless": "the first grasps of main with whole counts and no other noise",
     "glitch-0": "other objects, without glitches of the hand's controller",
     "glitch-1": "other objects, with 1 glitch a minute",
     "glitch-7": "other objects, with 7 glitches a minute",
@@ -45,23 +42,11 @@ def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:
     }
 
 
-def report_facts(summary: Mapping[str, Any]) -> dict[str, object]:
-    """Return the head of the report, from the contents of `study.json`."""
-    return {
-        "data": {
-            role: f"{each['recordings']} recordings, {each['samples']:,} samples of single "
-            f"fingers, {each['rate']:.0f} Hz, {', '.join(each['fingers'])}; digest "
-            f"{each['digest'][:12]}"
-            for role, each in summary["data"].items()
-        },
-        **fact_texts(summary),
-    }
-
-
 def run_notes(summary: Mapping[str, Any]) -> list[str]:
     """Return sentences on what was run and what was left out."""
     notes = [
-        f"{role}: {corpus['recordings']} recordings; {ROLES.get(role, 'others')}."
+        f"{role}: {corpus['recordings']} recordings, {corpus['samples']:,} samples of single "
+        f"fingers at {corpus['rate']:.0f} Hz; {ROLES.get(role, 'others')}."
         for role, corpus in summary["data"].items()
     ]
     if summary["quick"]:

@@ -14,6 +14,7 @@ from holdfast.contact import STABLE, UNKNOWN
 from holdfast.errors import RecordingError, TrainingError
 from holdfast.features import Tare
 from holdfast.io import Dataset, load_dataset
+from holdfast.metrics.truth_labels import fingers_with_truth
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast_lab.study.kept import WORKER_MEMORY, recording_bytes
@@ -72,6 +73,12 @@ class Corpus(msgspec.Struct, frozen=True):
         """Whether the twin made the recordings."""
         return self.load()[0].metadata.get("source") == "twin"
 
+    @property
+    def has_truth(self) -> bool:
+        """Whether exact labels can be made for all fingers of the first recording."""
+        first = self.load()[0]
+        return len(fingers_with_truth(first)) == len(first.modules)
+
 
 @dataclass(frozen=True)
 class CorpusRecordings(Sequence[Recording]):
@@ -106,9 +113,8 @@ class StudyPlan(msgspec.Struct, frozen=True):
     Attributes:
         corpora: by role: "main" always, and of the following those that exist: "fresh" (the same
             objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
-            profiles), "finger" (the protocol of holdfast 0.1), "noiseless" (no noise but rounding),
-            "glitch-0", "glitch-1" and "glitch-7" (other objects, with so many glitches of the
-            hand's controller a minute), "aged" (other objects, skins aged by four months),
+            profiles), "glitch-0", "glitch-1" and "glitch-7" (other objects, with so many glitches
+            of the hand's controller a minute), "aged" (other objects, skins aged by four months),
             "impacts" (other objects, the hand and its object are knocked), "slips" (other objects,
             slips that no push causes), and "taught" (what a user would record to teach a hand).
         real: recordings of a real hand; None if there are none.

@@ -1,77 +1,56 @@
 """A whole study: run the tasks of all parts, then write tables, figures and the report."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 from holdfast.parallel import Engine
-from holdfast_lab.report.environment import machine, versions
+from holdfast_lab.report.environment import fact_texts, machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, to_json
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study import environment
-from holdfast_lab.study.citation import (
-    METHODS_FILE,
-    REFERENCES_FILE,
-    bibliography,
-    methods_text,
-)
-from holdfast_lab.study.comparison import (
-    all_methods,
-    real_recordings,
-    sensitivity,
-    shipped,
-    slip_table,
-)
+from holdfast_lab.study.comparison import all_methods, real_recordings, shipped, slip_table
+from holdfast_lab.study.comparison.jobs import method_titles
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.paper import (
-    attribution,
-    claims,
-    experiments,
-    label_tables,
-    paper_tables,
-    verdicts,
-)
+from holdfast_lab.study.paper import experiment_tables, experiments, paper_tables
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.study.sections import PartOutput, report_sections
 from holdfast_lab.tasks import Notify, ShowProgress, Task, TaskRunner
 
-STUDY = ReportKind("study", "study.json", (METHODS_FILE, REFERENCES_FILE))
+STUDY = ReportKind("study", "study.json")
 TITLE = "Slip and disturbance at the fingertips: the study"
 
 
-class StudyPart(Protocol):
-    """A module of the study: its tasks, and the tables and figures of their results."""
-
-    def tasks(self, plan: StudyPlan) -> list[Task]:
-        """Return what has to be computed."""
-        ...
-
-    def tables(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
-        """Return the tables of the results."""
-        ...
-
-    def figures(self, plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-        """Return the figures of the results."""
-        ...
+Results = Mapping[str, Any]
 
 
-PARTS: Mapping[str, StudyPart] = {
-    "paper": paper_tables,
-    "experiments": experiments,
-    "verdicts": verdicts,
-    "labels": label_tables,
-    "attribution": attribution,
-    "claims": claims,
-    "comparison": all_methods,
-    "slips": slip_table,
-    "shipped": shipped,
-    "sensitivity": sensitivity,
-    "real": real_recordings,
+class StudyPart(NamedTuple):
+    """A part of the study.
+
+    Attributes:
+        tasks: function that returns what has to be computed.
+        tables: function that returns the tables of the results.
+        figures: function that returns the figures of the results.
+    """
+
+    tasks: Callable[[StudyPlan], list[Task]]
+    tables: Callable[[StudyPlan, Results], list[ResultTable]] = lambda *_: []
+    figures: Callable[[StudyPlan, Results], list[ReportFigure]] = lambda *_: []
+
+
+PARTS = {
+    "paper": StudyPart(paper_tables.tasks, paper_tables.tables, paper_tables.figures),
+    "experiments": StudyPart(experiments.tasks, figures=experiments.figures),
+    "experiment tables": StudyPart(experiment_tables.tasks, experiment_tables.tables),
+    "comparison": StudyPart(all_methods.tasks, all_methods.tables, all_methods.figures),
+    "slips": StudyPart(slip_table.tasks, slip_table.tables),
+    "shipped": StudyPart(shipped.tasks, shipped.tables),
+    "real": StudyPart(real_recordings.tasks, real_recordings.tables),
 }
 """The parts of the study, by name."""
-ONLY_FULL = ("labels", "attribution", "claims", "slips", "shipped", "sensitivity")
+ONLY_FULL = ("slips", "shipped")
 """Those beyond the paper's tables, events and splits. A quick study has them at a small size."""
 
 
@@ -134,16 +113,13 @@ def run_study(
         "tasks": len(tasks),
         "left_out": [*left_out, *whole_hand_note(plan), *full_note(skipped)],
     }
-    sections = report_sections(outputs, environment.run_notes(summary), twin=plan.main.is_simulated)
+    sources = [f"{title}: {METHODS[name].source}." for name, title in method_titles(plan).items()]
+    notes = environment.run_notes(summary)
+    sections = report_sections(outputs, notes, sources, twin=plan.main.is_simulated)
     # Those of the sections, because they carry the note on the twin.
     tables = [table for section in sections for table in section.tables]
     document = {"tables": {table.name: to_json(table) for table in tables}, **summary}
-    facts = environment.report_facts(summary)
-    others = {
-        METHODS_FILE: methods_text(plan, summary, tables).encode(),
-        REFERENCES_FILE: bibliography(summary).encode(),
-    }
-    write_report(out, STUDY, TITLE, facts, sections, document, others=others, force=force)
+    write_report(out, STUDY, TITLE, fact_texts(summary), sections, document, force=force)
     return tables
 
 

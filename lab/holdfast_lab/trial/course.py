@@ -1,4 +1,4 @@
-"""Course of a trial over time, beyond the loss of the object, for a figure and a film."""
+"""Course of a trial over time, beyond the loss of the object, for a figure."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple, Self
@@ -9,7 +9,6 @@ import numpy as np
 from holdfast.contact import CONTACT_FORCE
 from holdfast.twin.hand import RATE
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
-from holdfast.twin.world import World
 from holdfast_lab.trial.run import RunningTrial, least_force_at
 from holdfast_lab.trial.trials import IMPACT_SPACING, Trial
 
@@ -27,18 +26,14 @@ class Instant(NamedTuple):
         force: sum of the normal forces [N].
         least: least sum that holds the object [N].
         slip_speed: largest slip speed of a fingertip in contact [m/s].
-        state: state of the loop.
         is_lost: whether the object is lost.
-        world: physical state of the twin, valid until the next sample; None in an invented one.
     """
 
     time: float
     force: float
     least: float
     slip_speed: float
-    state: str
     is_lost: bool
-    world: World | None
 
 
 class TrialCourse(msgspec.Struct, frozen=True):
@@ -80,7 +75,7 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
     running = RunningTrial(trial, law, model)
     n_lost = 0
     while not running.is_over and n_lost <= FALL_TIME * RATE:
-        command = running.step()
+        running.step()
         n_lost += running.is_lost
         held_for = running.simulation.held_for
         # An impact may already cost the object.
@@ -94,7 +89,5 @@ def follow(trial: Trial, law: str, model: str) -> Iterator[Instant]:
             force=float(tips[:, TIP_LOAD].sum()),
             least=least_force_at(trial, held_for),
             slip_speed=float(speeds.max()),
-            state=command.state.value,
             is_lost=running.is_lost,
-            world=running.simulation.world,
         )

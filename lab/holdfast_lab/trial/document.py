@@ -34,7 +34,7 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
     Args:
         plan: of the comparison.
         results: by law, in the order of the trials.
-        example: number of the trial of the film; None if there is none.
+        example: number of the trial that is shown; None if there is none.
     """
     # A result for JSON, null for what is infinite or unknown.
     return {

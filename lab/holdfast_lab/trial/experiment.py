@@ -1,28 +1,61 @@
 """A whole comparison of laws: run the trials, then write tables, figures and the report."""
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from holdfast.errors import OutputError
 from holdfast.parallel import Engine
 from holdfast_lab.report.environment import fact_texts, machine, versions
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
+from holdfast_lab.report.sections import Section
 from holdfast_lab.tasks import Notify, ShowProgress, TaskRunner
+from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import (
     BASELINE_LAW,
     OWN_LAW,
+    TrialResults,
     document_of,
     example_of,
     trials_csv,
 )
+from holdfast_lab.trial.figures import (
+    course_figure,
+    distribution_figure,
+    kinds_figure,
+    trade_off_figure,
+)
 from holdfast_lab.trial.plan import TrialPlan
-from holdfast_lab.trial.report import Example, report_sections
+from holdfast_lab.trial.tables import (
+    fingers_table,
+    kinds_table,
+    law_tables,
+    objects_table,
+    paired_table,
+)
 from holdfast_lab.trial.trials import draw_trial
 
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
 """What the folder of a comparison holds."""
 TRIAL_TITLE = "Grip laws against each other on the twin"
+WHAT_NUMBERS_MEAN = (
+    "Results of a simulation: docs/study/grip.md says what each number means, docs/twin.md what "
+    "the twin cannot show."
+)
+RULE = f"It is the first of the set that {BASELINE_LAW} loses and {OWN_LAW} holds."
+"""How the trial that is shown is chosen."""
+
+
+class Example(NamedTuple):
+    """The trial that is shown.
+
+    Attributes:
+        what: sentence that describes the trial.
+        courses: its course by law.
+    """
+
+    what: str
+    courses: Mapping[str, TrialCourse]
 
 
 def run_trials(
@@ -91,7 +124,7 @@ def run_trials(
 
 
 def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
-    """Return courses and film of a trial; the film is made in this process."""
+    """Return the courses of a trial."""
     laws = (BASELINE_LAW, OWN_LAW)
     tasks = {law: plan.course_task(number, law) for law in laws}
     done = runner.run(list(tasks.values()))
@@ -103,11 +136,33 @@ def _example(plan: TrialPlan, number: int, runner: TaskRunner) -> Example:
         f"Trial {number}: {trial.grasp.object}, {trial.n_fingers} fingers, load "
         f"{trial.load.kind.value}{when}."
     )
-    task = plan.film_task(number, laws)
-    runner.notify("rendering the film of one trial")
-    try:
-        # In this process: it needs a back end of MuJoCo, which a worker may lack.
-        film = TaskRunner(runner.folder).run([task])[task.name]
-    except OutputError as cause:
-        return Example(what, courses, reason=str(cause))
-    return Example(what, courses, film)
+    return Example(what, courses)
+
+
+def report_sections(
+    document: Mapping[str, Any], results: TrialResults, example: Example | None
+) -> list[Section]:
+    """Return the sections of the report.
+
+    Args:
+        document: contents of `trial.json`.
+        results: of all trials, by law.
+        example: the trial that is shown, if there is one.
+    """
+    shown = Section("One trial, lost and saved", f"There is no such trial. {RULE}")
+    if example is not None:
+        figure = course_figure(example.courses, example.what)
+        shown = Section(shown.title, f"{example.what} {RULE}", [], [figure])
+    paired = [paired_table(document, other) for other in document["paired"]]
+    return [
+        Section("All laws", WHAT_NUMBERS_MEAN, law_tables(document), [trade_off_figure(document)]),
+        Section("In pairs", "", [table for table in paired if table.rows]),
+        Section("Slip and reaction", "", [], [distribution_figure(results)]),
+        Section(
+            "Kinds of load, objects and fingers",
+            "",
+            [kinds_table(document), objects_table(document), fingers_table(document)],
+            [kinds_figure(document)],
+        ),
+        shown,
+    ]

@@ -25,7 +25,7 @@ from holdfast.plots.style import (
 )
 from holdfast.sensors.types import Array
 from holdfast_lab.figures.dots import IntervalEstimate, draw_groups
-from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import GOALS, TrialResults
 from holdfast_lab.trial.run import TrialResult

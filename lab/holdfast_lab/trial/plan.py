@@ -2,9 +2,6 @@
 
 from dataclasses import dataclass
 from functools import cache
-from hashlib import sha256
-
-import msgspec
 
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
@@ -12,20 +9,13 @@ from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.plant import MILD, plant_named
-from holdfast_grip import laws
 from holdfast_grip.laws import LAWS
-from holdfast_lab.source_digest import source_digest
 from holdfast_lab.tasks import Task
 from holdfast_lab.trial.course import TrialCourse, follow
-from holdfast_lab.trial.film import film
 from holdfast_lab.trial.reference_rows import REFERENCE_ROWS, row_named
 from holdfast_lab.trial.run import TrialResult, run_trial
 from holdfast_lab.trial.trials import draw_trial
 
-SIMULATION = ("holdfast_lab.trial.run", "holdfast_lab.trial.trials")
-"""Modules that draw and run a trial."""
-COURSE = (*SIMULATION, "holdfast_lab.trial.course")
-FILM = (*COURSE, "holdfast_lab.trial.film")
 ALL_ROWS = (*LAWS, *REFERENCE_ROWS)
 """Laws, and the rows beside them."""
 
@@ -89,22 +79,13 @@ class TrialPlan:
 
     def trial_task(self, number: int, law: str) -> Task:
         """Return the task of one trial with one law."""
-        version = law_version(law, SIMULATION)
         arguments = (self.seed, number, law, *self._set)
-        return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult, version=version)
+        return Task(f"trial/{number}/{law}", run_numbered, arguments, TrialResult)
 
     def course_task(self, number: int, law: str) -> Task:
         """Return the task of the course of one trial with one law."""
         arguments = (self.seed, number, law, *self._set)
-        version = law_version(law, COURSE)
-        return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse, version=version)
-
-    def film_task(self, number: int, laws: tuple[str, str]) -> Task:
-        """Return the task of the film of one trial with two laws."""
-        arguments = (self.seed, number, laws, *self._set)
-        versions = (law_version(law, FILM) for law in laws)
-        version = sha256("".join(versions).encode()).hexdigest()
-        return Task(f"film/{number}", film_of, arguments, bytes, version=version)
+        return Task(f"course/{number}/{law}", course_of, arguments, TrialCourse)
 
 
 def run_numbered(
@@ -148,57 +129,8 @@ def course_of(
     return TrialCourse.of(follow(draw_trial(number, seed, plant, n_impacts), law, model))
 
 
-def film_of(
-    seed: int,
-    number: int,
-    laws: tuple[str, str],
-    model: str,
-    digest: str,
-    plant: str = MILD,
-    n_impacts: int = 0,
-) -> bytes:
-    """Return the film of one trial with two laws side by side, as a WebP file.
-
-    Raises:
-        OutputError: no back end of MuJoCo works here.
-    """
-    _check_digest(model, digest)
-    return film(draw_trial(number, seed, plant, n_impacts), laws, model)
-
-
 # Once in a process, because every trial asks for the same model.
 @cache
 def _check_digest(model: str, digest: str) -> None:
     if Model.load(model).digest != digest:
         raise ModelError(f"the model {model} has another content here: copy it to every worker")
-
-
-@cache
-def law_version(law: str, modules: tuple[str, ...]) -> str:
-    """Return a digest of what a trial depends on: the source, and the constants of its law.
-
-    The files of other laws are left out, so that a new law leaves the results of the others.
-
-    Args:
-        law: name of the law.
-        modules: that make the result.
-    """
-    law_modules = {type(factory()).__module__ for factory in LAWS.values()}
-    law_row = row_named(law)
-    own = type(law_row).__module__
-    source = source_digest((*modules, own), (*sorted(law_modules - {own}), laws.__name__))
-    constants = msgspec.json.encode(_contents(law_row), order="deterministic")
-    return sha256(source.encode() + constants).hexdigest()
-
-
-def _contents(value: object) -> object:
-    """Return a law, or a part of it, as plain values."""
-    if isinstance(value, (str, int, float, bool, type(None))):
-        return value
-    if isinstance(value, (list, tuple)):
-        return [_contents(each) for each in value]
-    if isinstance(value, dict):
-        return {str(key): _contents(each) for key, each in value.items()}
-    kind = value if isinstance(value, type) else type(value)
-    attributes = getattr(value, "__dict__", {}) if kind is not value else {}
-    return [kind.__qualname__, {name: _contents(each) for name, each in attributes.items()}]

@@ -73,21 +73,6 @@ SHORT = NUMBER_COLUMNS[:4]
 """Numbers in tables of parts of the trials."""
 
 
-def all_tables(document: Mapping[str, Any]) -> list[ResultTable]:
-    """Return all tables of the report, in its order."""
-    return [
-        *law_tables(document),
-        objects_table(document),
-        *(
-            paired_table(document, other)
-            for other in document["paired"]
-            if len(document["laws"]) > 1
-        ),
-        kinds_table(document),
-        fingers_table(document),
-    ]
-
-
 def law_tables(document: Mapping[str, Any]) -> list[ResultTable]:
     """Return the tables of all laws over all trials.
 

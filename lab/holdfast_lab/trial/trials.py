@@ -116,22 +116,6 @@ def least_force(item: GraspObject) -> float:
     return item.mass * GRAVITY / item.mu_static
 
 
-def draw_trials(n: int, seed: int = 0, plant: str = MILD) -> list[Trial]:
-    """Draw trials in which objects, kinds of loads and grips take turns.
-
-    Args:
-        n: number of trials; 60 have every object with every kind once.
-        seed: of all random numbers.
-        plant: name of the plant; objects, grips and loads are the same in all plants.
-
-    Example:
-        >>> trials = draw_trials(60)
-        >>> len({(trial.grasp.object, trial.load.kind) for trial in trials})
-        60
-    """
-    return [draw_trial(number, seed, plant) for number in range(n)]
-
-
 def draw_trial(number: int, seed: int = 0, plant: str = MILD, n_impacts: int = 0) -> Trial:
     """Draw one trial of a set, which does not depend on the others.
 

@@ -10,20 +10,12 @@ from holdfast.cli.options import EngineOptions, ForceOption, JsonOption, SeedOpt
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast_lab.verbs import OutOption, QuickOption
-from holdfast_lab.verbs.benchmark import make_data, print_scores
-
-ACTIONS = {"data": "a folder", "score": "a .csv or .parquet file"}
-"""Actions of the benchmark, and what follows them."""
 
 
 def study(
     data: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[DATA | data FOLDER | score FILE]",
-            help="A folder of labelled recordings; or give --twin. data: simulate the recordings "
-            "of the benchmark. score: score a submission to it.",
-        ),
+        Path | None,
+        typer.Argument(metavar="[DATA]", help="A folder of labelled recordings; or give --twin."),
     ] = None,
     *,
     out: OutOption = Path("study"),
@@ -35,38 +27,29 @@ def study(
         bool,
         typer.Option(
             "--full",
-            help="Also labels, attribution, claims, slips of fingers, sensitivity, and the models "
-            "that ship: on knocks, aged skins and slips by speed, untaught and taught.",
+            help="Also slips of fingers, and the models that ship: on knocks, aged skins and slips "
+            "by speed, untaught and taught.",
         ),
     ] = False,
     parallel: EngineOptions,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
-    benchmark: Annotated[
-        Path, typer.Option(metavar="FOLDER", help="Recordings of the benchmark, for score.")
-    ] = Path("benchmark"),
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
     """Repeat the experiments of the paper, and run further ones.
 
-    Write OUT/report.html, every table as CSV, JSON, LaTeX and Markdown, every figure as SVG and
-    PNG, study.json, and methods.md and references.bib for a publication. Finished tasks are kept in
-    OUT/work and simulated recordings in OUT/data, also with --force, so the same command continues
-    a study that was stopped. Of real recordings, imported or your own, the study compares
-    builtin:any, as it ships and adapted, with every method trained on the other recordings. With
-    recordings of the twin, the real ones are read from HOLDFAST_DATA, or from ../shared/data, if
-    they exist.
-
-    data FOLDER simulates the recordings of the frozen benchmark, and score FILE scores what
-    another program says of them, see docs/benchmark.md.
+    Write OUT/report.md, every table as CSV and Markdown, every figure as PNG, and study.json.
+    Finished tasks are kept in OUT/work and simulated recordings in OUT/data, also with --force, so
+    the same command continues a study that was stopped. Of real recordings, imported or your own,
+    the study compares builtin:any, as it ships and adapted, with every method trained on the other
+    recordings. With recordings of the twin, the real ones are read from HOLDFAST_DATA, or from
+    ../shared/data, if they exist.
 
     Example:
       holdfast study --twin --quick --out quick/
       holdfast study --twin --out study/ --jobs -1
       holdfast study real/ --tare first --quick --out real-study/
-      holdfast study data benchmark/
-      holdfast study score scores.csv --benchmark benchmark/
     """
     from msgspec import json
 
@@ -76,14 +59,7 @@ def study(
     from holdfast_lab.study.corpora import plan_study
     from holdfast_lab.study.run import STUDY, run_study
 
-    action, path = action_of(data or [])
-    if action == "score" and path is not None:
-        print_scores(path, benchmark, as_json=as_json)
-        return
-    if action == "data" and path is not None:
-        make_data(path, parallel.start(), as_json=as_json)
-        return
-    if (path is None) != twin:
+    if (data is None) != twin:
         given = "both" if twin else "neither"
         raise ValueError(f"a folder of recordings or --twin expected, {given} given")
     if quick and full:
@@ -96,7 +72,7 @@ def study(
     started_at = time.perf_counter()
     try:
         plan, left_out = plan_study(
-            path, out, seed, tare, parallel.jobs, quick=quick, full=full,
+            data, out, seed, tare, parallel.jobs, quick=quick, full=full,
             notify=print_message, steps=progress
         )  # fmt: skip
         tables = run_study(
@@ -112,17 +88,4 @@ def study(
     for table in tables:
         if table.name in PRINTED_COLUMNS:
             print_main_table(table)
-    print_line(f"{out / 'report.html'}: all {len(tables)} tables and the figures")
-
-
-def action_of(words: list[Path]) -> tuple[str, Path | None]:
-    """Return what is done, and its path; refuse other words."""
-    if len(words) < 2:
-        if words and str(words[0]) in ACTIONS and not words[0].is_dir():
-            raise ValueError(f"{words[0]}: {ACTIONS[str(words[0])]} expected after it")
-        return "study", words[0] if words else None
-    action = str(words[0])
-    if len(words) > 2 or action not in ACTIONS:
-        given = " ".join(map(str, words))
-        raise ValueError(f"a folder, data FOLDER or score FILE expected, {given!r} given")
-    return action, words[1]
+    print_line(f"{out / 'report.md'}: all {len(tables)} tables and the figures")

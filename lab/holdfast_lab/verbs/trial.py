@@ -51,8 +51,8 @@ def trial(
 
     In each trial the hand of the twin grips an object lightly, and then a load comes: added
     weight, a pull, friction that drops, a shake, or a fast transport. Objects, loads and grips
-    follow from the seed. Write OUT/report.html with a film of one trial, trial.json, trials.csv,
-    and each table and figure. Finished trials are kept in OUT/work, also with --force, so the same
+    follow from the seed. Write OUT/report.md, trial.json, trials.csv, and each table
+    and figure. Finished trials are kept in OUT/work, also with --force, so the same
     command continues a comparison that was stopped, and one more law runs only its own trials.
     There are 240 trials, or 60 with --quick. --plant hard adds latency, backlash, friction of the
     joints, the lag of the motors and more jerks of the hand's controller.
@@ -83,7 +83,7 @@ def trial(
         print_json(document)
     else:
         _print_table(document["laws"])
-        print_line(f"{out / 'report.html'}: all tables and figures, and the film of one trial")
+        print_line(f"{out / 'report.md'}: all tables and figures")
 
 
 def _print_table(laws: Mapping[str, Mapping[str, Any]]) -> None:

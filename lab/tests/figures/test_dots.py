@@ -16,7 +16,7 @@ def test_dots_are_sorted_by_the_first_panel():
         draw_dots(
             {
                 "by recording": {
-                    "a": IntervalEstimate(90.0, 88.0, 91.0, 95.0),
+                    "a": IntervalEstimate(90.0, 88.0, 91.0),
                     "b": IntervalEstimate(92.0),
                     "c": IntervalEstimate(None),
                 },
@@ -33,7 +33,6 @@ def test_dots_are_sorted_by_the_first_panel():
         line.get_ydata()[0]: line.get_xdata()[0] for line in left.lines if line.get_marker() == "o"
     }
     assert (dots[2], dots[3]) == (90.0, 92.0)
-    assert [line.get_xdata()[0] for line in left.lines if line.get_marker() == "D"] == [95.0]
     bars = [path.vertices[:, 0].tolist() for each in left.collections for path in each.get_paths()]
     assert [88.0, 91.0] in bars
     assert {line.get_ydata()[0] for line in right.lines} == {0, 2}

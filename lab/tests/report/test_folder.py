@@ -1,20 +1,36 @@
 import json
 
 import pytest
+from matplotlib.figure import Figure
 
 from holdfast.errors import OutputError
 from holdfast_lab.report.folder import ReportKind, check_output_folder, write_report
-from holdfast_lab.report.html_report import ReportFigure, Section
-
-from .test_html_report import drawn, sections
+from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.report.sections import ReportFigure, Section
 
 pytestmark = pytest.mark.slow
 
 STUDY = ReportKind("study", "study.json", ("extra.bin",))
 
 
+def drawn():
+    figure = Figure(figsize=(1, 1))
+    figure.subplots().plot([1, 2])
+    return figure
+
+
+def table(name):
+    return ResultTable(name, name, "", [Row({"m": "a", "figure": "x"}, 1.0, 2.0)], ("m",))
+
+
+SECTIONS = [
+    Section("One", "A text.", [table("first")], [ReportFigure("curve", "A <curve>.", drawn())]),
+    Section("Two", "", [table("second")], [ReportFigure("curve-2", "", drawn())]),
+]
+
+
 def write(out, **options):
-    write_report(out, STUDY, "Study", {"seed": 0}, sections(), {"seed": 0}, **options)
+    write_report(out, STUDY, "Study", {"seed": "0"}, SECTIONS, {"seed": 0}, **options)
 
 
 def files(folder):
@@ -26,24 +42,16 @@ def test_files_of_the_folder(tmp_path):
     write(out)
     assert files(out) == [
         "figures/curve-2.png",
-        "figures/curve-2.svg",
         "figures/curve.png",
-        "figures/curve.svg",
-        "report.html",
+        "report.md",
         "study.json",
-        *(
-            f"tables/{name}.{kind}"
-            for name in ("first", "second")
-            for kind in ("csv", "json", "md", "tex")
-        ),
+        *(f"tables/{name}.{kind}" for name in ("first", "second") for kind in ("csv", "md")),
     ]
     assert json.loads((out / "study.json").read_text()) == {"seed": 0}
-    assert json.loads((out / "tables/first.json").read_text())["rows"][0] == {
-        "m": "a", "figure": "x", "ours": 1.0, "paper": 2.0, "difference": -1.0, "n": None,
-        "interval": None,
-    }  # fmt: skip
     assert (out / "figures/curve.png").read_bytes()[:4] == b"\x89PNG"
-    assert (out / "figures/curve.svg").read_text().startswith("<?xml")
+    report = (out / "report.md").read_text()
+    assert report.startswith("# Study\n\n- seed: 0\n\n## One\n\nA text.\n\n**first**\n")
+    assert "![curve](figures/curve.png)\n\nA \\<curve\\>.\n" in report
 
 
 def test_stored_results_of_a_stopped_study_stay(tmp_path):
@@ -97,3 +105,10 @@ def test_a_failed_write_changes_nothing(tmp_path):
     with pytest.raises(ValueError, match="figure's name"):
         write_report(out, STUDY, "Other", {}, broken, {}, force=True)
     assert {name: (out / name).read_bytes() for name in files(out)} == before
+
+
+def test_two_tables_of_one_name_are_refused(tmp_path):
+    twice = [Section("One", "", [table("first"), table("first")])]
+    with pytest.raises(ValueError, match="two tables of the report are called 'first'"):
+        write_report(tmp_path / "out", STUDY, "Study", {}, twice, {})
+    assert not (tmp_path / "out").exists()

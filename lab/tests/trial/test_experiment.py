@@ -1,7 +1,6 @@
 import csv
 import json
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -13,21 +12,22 @@ import pytest
 
 from holdfast.errors import OutputError
 from holdfast.parallel import Engine
-from holdfast_lab.report.html_report import Section
+from holdfast_lab.report.sections import Section
 from holdfast_lab.trial import experiment
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.course import TrialCourse
+from holdfast_lab.trial.document import document_of, example_of
 from holdfast_lab.trial.experiment import run_trials
 from holdfast_lab.trial.plan import TrialPlan
 
-from .example_results import invented
+from .example_results import invented, results_of
 
 LAWS = ("fixed", "holdfast")
 
 
 @pytest.fixture
 def calls(monkeypatch):
-    """Trials, courses and films that take no time; the names of all trials that were run."""
+    """Trials and courses that take no time; the names of all trials that were run."""
     made = []
 
     def run_trial(trial, law, model):
@@ -38,7 +38,6 @@ def calls(monkeypatch):
     monkeypatch.setattr(trial_plan, "run_trial", run_trial)
     monkeypatch.setattr(trial_plan, "follow", lambda *_: ())
     monkeypatch.setattr(TrialCourse, "of", lambda _: course)
-    monkeypatch.setattr(trial_plan, "film", lambda *_: b"RIFF")
     return made
 
 
@@ -62,18 +61,21 @@ def test_files_of_a_comparison(tmp_path, calls):
     document = run_trials(TrialPlan(LAWS, 6), tmp_path / "out")
     out = tmp_path / "out"
     assert {path.name for path in out.iterdir()} == {
-        "report.html", "trial.json", "trials.csv", "tables", "figures", "work",
+        "report.md", "trial.json", "trials.csv", "tables", "figures", "work",
     }  # fmt: skip
     assert "numpy" in document["versions"]
     assert document["example"] == {
         "number": 0, "object": "ball", "kind": "weight", "n_fingers": 4,
         "lost_by": "fixed", "held_by": "holdfast",
     }  # fmt: skip
-    assert (out / "figures/film.webp").read_bytes() == b"RIFF"
     assert len(list(csv.reader((out / "trials.csv").read_text().splitlines()))) == 13
-    page = (out / "report.html").read_text()
+    page = (out / "report.md").read_text()
     assert "fixed loses it 0.40 s later" in page
     assert str(tmp_path) not in page
+    for name in ("laws", "slips", "forces", "drops", "paired-fixed", "kinds", "objects", "fingers"):
+        assert (out / f"tables/{name}.md").read_text().strip() in page
+    for name in ("course", "force", "distributions", "kinds"):
+        assert f"(figures/{name}.png)" in page and (out / f"figures/{name}.png").is_file()
 
 
 def test_finished_trials_are_not_run_again(tmp_path, calls, undrawn):
@@ -137,17 +139,6 @@ def test_a_killed_comparison_continues(tmp_path, calls, undrawn):
     assert outcome(out) == outcome(tmp_path / "whole")
 
 
-def test_without_a_renderer_there_is_a_report_without_a_film(tmp_path, calls, monkeypatch):
-    def fail(*_):
-        raise OutputError("cannot render: no back end")
-
-    monkeypatch.setattr(trial_plan, "film", fail)
-    run_trials(TrialPlan(LAWS, 2), tmp_path / "out")
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert re.search("There is no film: (film/0: )?cannot render: no back end", page)
-    assert not (tmp_path / "out" / "figures" / "film.webp").exists()
-
-
 def test_other_files_are_not_touched(tmp_path, calls):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(OutputError, match=r"holds other files \(notes.txt, ...\) and no compari"):
@@ -186,3 +177,11 @@ def test_a_cluster_gives_the_same_results(real, tmp_path, undrawn):
 
 def test_the_kind_of_folder_is_named_by_its_summary():
     assert experiment.COMPARISON.outputs[-1] == "trial.json"
+
+
+def test_without_an_example_the_report_says_so():
+    results = results_of(("pr2",))
+    document = document_of(TrialPlan(tuple(results), 12), results, example_of(results))
+    laws, paired, *_, shown = experiment.report_sections(document, results, None)
+    assert shown.text.startswith("There is no such trial.") and not shown.figures
+    assert laws.tables and not paired.tables

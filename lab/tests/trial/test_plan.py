@@ -1,39 +1,14 @@
 import ast
-import subprocess
 import sys
 from pathlib import Path
 
 import msgspec
 import pytest
 
-import holdfast
 from holdfast.errors import ModelError
 from holdfast.model import Model
 from holdfast_grip import laws
-from holdfast_lab.source_digest import PACKAGES, _closure
-from holdfast_lab.trial import plan as trial_plan
-from holdfast_lab.trial.plan import SIMULATION, TrialPlan, run_numbered
-
-PACKAGE = Path(holdfast.__file__).parent
-
-
-def trial_modules(law):
-    """Return the names of the modules on which a trial with a law depends."""
-    own = type(laws.LAWS[law]()).__module__
-    others = {type(factory()).__module__ for factory in laws.LAWS.values()} - {own}
-    return set(_closure((*SIMULATION, own), (*others, laws.__name__)))
-
-
-def version(law):
-    return TrialPlan((law,), 1).trial_task(0, law).version
-
-
-@pytest.fixture
-def fresh():
-    """Versions are computed again, before and after the test."""
-    trial_plan.law_version.cache_clear()
-    yield
-    trial_plan.law_version.cache_clear()
+from holdfast_lab.trial.plan import TrialPlan, run_numbered
 
 
 @pytest.mark.parametrize(
@@ -77,49 +52,18 @@ def test_a_result_is_stored_for_its_plant():
     tasks = {}
     for plant in ("mild", "hard"):
         plan = TrialPlan(("fixed",), 1, plant=plant)
-        film = plan.film_task(0, ("fixed", "holdfast"))
-        tasks[plant] = [plan.trial_task(0, "fixed"), plan.course_task(0, "fixed"), film]
+        tasks[plant] = [plan.trial_task(0, "fixed"), plan.course_task(0, "fixed")]
     for mild, hard in zip(tasks["mild"], tasks["hard"], strict=True):
         assert mild.arguments != hard.arguments
-        assert mild.version == hard.version
 
 
-class TestVersion:
-    def test_it_depends_on_the_constants_of_the_law(self, fresh, monkeypatch):
-        before = {law: version(law) for law in ("pr2", "holdfast")}
-        trial_plan.law_version.cache_clear()
-        monkeypatch.setitem(laws.LAWS, "holdfast", lambda: laws.Stability(fall=0.6))
-        assert version("holdfast") != before["holdfast"]
-        assert version("pr2") == before["pr2"]
-
-    def test_it_does_not_depend_on_files_of_other_laws(self):
-        modules = trial_modules("pr2")
-        assert {"holdfast_grip.laws.pr2", "holdfast_grip.laws.base"} <= modules
-        assert not {"holdfast_grip.laws", "holdfast_grip.laws.stability"} & modules
-
-    def test_it_depends_on_all_that_a_trial_imports(self):
-        code = "import sys, holdfast_lab.trial.run; print(*sys.modules)"
-        done = subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=True
-        )
-        loaded = {name for name in done.stdout.split() if name.split(".")[0] in PACKAGES}
-        other_laws = {name for name in loaded if name.startswith("holdfast_grip.laws")}
-        # their C files count beside the packages
-        compiled = {"holdfast.kernel._extension", "holdfast.twin.steps"}
-        assert loaded - other_laws - compiled <= trial_modules("holdfast")
-
-    def test_it_does_not_depend_on_what_shows_the_results(self):
-        parts = {name.split(".")[1] for name in trial_modules("pr2") if "." in name}
-        assert not parts & {"cli", "devices", "io", "labelling", "live", "plots", "report", "web"}
-        assert "holdfast_lab.trial.course" not in trial_modules("pr2")
-
-    def test_no_law_imports_another(self):
-        modules = {type(law()).__module__ for law in laws.LAWS.values()}
-        for module in modules:
-            path = Path(sys.modules[module].__file__)
-            imported = {
-                node.module
-                for node in ast.walk(ast.parse(path.read_text("utf-8")))
-                if isinstance(node, ast.ImportFrom)
-            }
-            assert not imported & (modules - {module})
+def test_no_law_imports_another():
+    modules = {type(law()).__module__ for law in laws.LAWS.values()}
+    for module in modules:
+        path = Path(sys.modules[module].__file__)
+        imported = {
+            node.module
+            for node in ast.walk(ast.parse(path.read_text("utf-8")))
+            if isinstance(node, ast.ImportFrom)
+        }
+        assert not imported & (modules - {module})

@@ -7,7 +7,7 @@ from holdfast.twin.hand import RATE
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
 from holdfast_lab.trial.run import RunningTrial, least_force_at, run_trial
-from holdfast_lab.trial.trials import Trial, draw_trials, least_force
+from holdfast_lab.trial.trials import Trial, draw_trial, least_force
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +54,7 @@ def test_trials_of_any_law_begin_alike(fixed):
     other = run_trial(CAN, "holdfast")
     assert (other.held, other.quiet_time) == (fixed.held, fixed.quiet_time)
     assert other.slip < math.inf or other.dropped
-    assert draw_trials(1)[0].number == 0
+    assert draw_trial(0).number == 0
 
 
 def test_a_constant_force_is_no_false_reaction():

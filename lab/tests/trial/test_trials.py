@@ -4,7 +4,11 @@ import numpy as np
 import pytest
 
 from holdfast.twin.loads import LoadKind
-from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trial, draw_trials, least_force
+from holdfast_lab.trial.trials import GRIP_MULTIPLE, draw_trial, least_force
+
+
+def draw_trials(n, **options):
+    return [draw_trial(number, **options) for number in range(n)]
 
 
 def test_the_same_seed_draws_the_same_trials():

@@ -12,7 +12,7 @@ from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast_lab.study import corpora
 from holdfast_lab.study import run as study_run
-from holdfast_lab.study.paper import experiments, paper_tables
+from holdfast_lab.study.paper import paper_tables
 from study.example_recordings import save_all
 
 pytestmark = pytest.mark.slow
@@ -22,7 +22,8 @@ pytestmark = pytest.mark.slow
 def nowhere(monkeypatch, tmp_path):
     """No real recordings, and few tasks."""
     monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "nothing"))
-    monkeypatch.setattr(study_run, "PARTS", {"paper": paper_tables, "experiments": experiments})
+    few = {name: study_run.PARTS[name] for name in ("paper", "experiments")}
+    monkeypatch.setattr(study_run, "PARTS", few)
     monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
     monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
 
@@ -41,10 +42,10 @@ def test_own_recordings(capsys, data, tmp_path):
     code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
     assert code == 0, err
     assert printed.startswith("The paper's Table I: confusion [%] (in parentheses: the paper)\n")
-    assert printed.endswith(f"{out / 'report.html'}: all 7 tables and the figures\n")
+    assert printed.endswith(f"{out / 'report.md'}: all 7 tables and the figures\n")
     assert "making tables and figures\n" in err
     assert {path.name for path in out.iterdir()} == {
-        "report.html", "study.json", "tables", "figures", "work", "methods.md", "references.bib",
+        "report.md", "study.json", "tables", "figures", "work",
     }  # fmt: skip
     summary = json.loads((out / "study.json").read_text())
     assert summary["left_out"] == []
@@ -71,7 +72,7 @@ def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     names = {path.stem for path in (out / "data/quick/main").iterdir()}
     assert {"can-case1-1", "can-case2-1"} <= names
     assert json.loads(printed)["data"]["main"]["recordings"] == len(names)
-    assert "What the twin cannot show" in (out / "report.html").read_text()
+    assert "These recordings are simulated" in (out / "report.md").read_text()
     assert refusal_after(capsys, *words, "--force", "--seed", 3).endswith(
         "can-case1-1.parquet has profile reference, seed 0, server False; profile "
         "reference, seed 3, server False given: choose another OUT, or delete its data"

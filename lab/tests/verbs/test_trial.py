@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.model import Model
-from holdfast_lab.report.html_report import Section
+from holdfast_lab.report.sections import Section
 from holdfast_lab.trial import experiment, plan
 from holdfast_lab.trial.course import TrialCourse
 from trial.example_results import invented
@@ -18,7 +18,6 @@ def quick(monkeypatch):
     monkeypatch.setattr(plan, "run_trial", invented)
     monkeypatch.setattr(plan, "follow", lambda *_: ())
     monkeypatch.setattr(TrialCourse, "of", lambda _: course)
-    monkeypatch.setattr(plan, "film", lambda *_: b"RIFF")
     monkeypatch.setattr(experiment, "report_sections", lambda *_: [Section("All", "")])
 
 
@@ -31,7 +30,7 @@ def test_trial_json_has_every_law(tmp_path, capsys, quick):
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines[:-1])) <= 80
     assert lines[2].split() == ["fixed", "3", "66.7", "inf", "inf", "1.40", "0.0"]
-    assert lines[-1].startswith(f"{tmp_path / 'out' / 'report.html'}: ")
+    assert lines[-1].startswith(f"{tmp_path / 'out' / 'report.md'}: ")
 
 
 @pytest.mark.slow

@@ -54,7 +54,6 @@ VERB_GROUPS = {
     "Laboratory": {
         "trial": "Compare laws of grip force on the twin, all on the same trials.",
         "study": "Repeat the experiments of the paper, and run further ones.",
-        "bench": "Measure the speed of the features and of the detector.",
     },
 }
 """Verbs in the order of the help, with the first line of their docstrings. Those that are plug-ins
@@ -236,9 +235,10 @@ class _GroupedVerbs(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401 (of click)
         """Take a verb and its command as one name."""
         name = " ".join(args[:2])
-        # A path may have the name of a command that was removed.
-        if name not in SUB_VERBS and not Path(*args[1:2]).exists():
-            for removed in (name, args[0]):
+        if name not in SUB_VERBS:
+            # A path may have the name of a command that was removed.
+            is_path = Path(*args[1:2]).exists()
+            for removed in (args[0],) if is_path else (name, args[0]):
                 if text := removal("verbs", removed, f"the verb {removed}"):
                     raise HoldfastError(text)
         return super().resolve_command(ctx, [name, *args[2:]] if name in SUB_VERBS else args)

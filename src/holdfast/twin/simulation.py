@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
@@ -67,8 +67,6 @@ class Grasp:
         server: whether stamps are unsteady and packets repeat, as a server sends them.
         table: path of another table of objects, like `OTHER_OBJECTS`; None for the built-in one.
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
-        noise: rms of a reading at rest [count]; rounding to whole counts remains. None for that
-            of the sensor.
         plant: name of the plant, see `holdfast.twin.plant`.
         faults: troubles of the skins.
     """
@@ -82,7 +80,6 @@ class Grasp:
     server: bool = False
     table: str | Path | None = None
     glitch_rate: float | None = None
-    noise: float | None = None
     plant: str = MILD
     faults: MagneticFaults = WITHOUT_FAULTS
 
@@ -154,8 +151,6 @@ class Simulation:
         self.plan = plan or draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
         skin = parameters or UskinParameters()
-        if grasp.noise is not None:
-            skin = replace(skin, noise_counts=grasp.noise)
         self.uskins = {f: _skin(grasp.seed, f, skin, chosen.coupled) for f in FINGERS}
         self.protocol = Protocol(self.plan, 1 / RATE)
         self.command: Command | None = None
@@ -442,7 +437,6 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "attempt": grasp.attempt,
         "profile": grasp.profile,
         **({} if grasp.glitch_rate is None else {"glitch_rate": grasp.glitch_rate}),
-        **({} if grasp.noise is None else {"noise": grasp.noise}),
         **({} if grasp.plant == MILD else {"plant": grasp.plant}),
         "seed": grasp.seed,
         "server": grasp.server,

@@ -1,20 +1,15 @@
-"""Part of the study: all methods on the same recordings, by sample, event and circumstance."""
+"""Part of the study: all methods on the same recordings, by sample and by event."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_reliability
-from holdfast_lab.figures.dots import IntervalEstimate, draw_dots, draw_groups
-from holdfast_lab.report.html_report import ReportFigure
+from holdfast_lab.figures.dots import IntervalEstimate, draw_dots
 from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast_lab.study.comparison import (
-    costs,
-    event_tables,
-    sample_tables,
-    strongest,
-)
+from holdfast_lab.report.sections import ReportFigure
+from holdfast_lab.study.comparison import event_tables, sample_tables, strongest
 from holdfast_lab.study.comparison.jobs import (
     DEFAULT_SECONDS,
     METHOD_SECONDS,
@@ -25,7 +20,6 @@ from holdfast_lab.study.comparison.jobs import (
     method_results,
     method_task,
     method_titles,
-    short_title,
     short_titles,
 )
 from holdfast_lab.study.evaluation.evaluate_method import (
@@ -48,24 +42,20 @@ TABLES = (
     event_tables.glitches,
     event_tables.glitch_rates,
     sample_tables.splits,
-    sample_tables.phases,
-    sample_tables.force,
-    sample_tables.directions,
     sample_tables.reliability,
-    costs.table,
 )
 """Functions that make the tables, in their order."""
 
 ALARM_CURVES = (
-    "logreg", "zhang", "slip_servo", "anyskin", "jl_global_logreg", "tcn", "trees", "holdfast",
+    "logreg", "zhang", "slip_servo", "anyskin", "jl_global_logreg", "trees", "holdfast",
 )  # fmt: skip
 """Methods in the figure of alarms, one of each kind: more curves would be hard to read."""
 DETAIL_METHODS = ("logreg", "svm", "zhang", "trees", "holdfast")
-"""Methods in the figures of reliability and errors."""
+"""Methods in the figure of reliability."""
 
 
 def tasks(plan: StudyPlan) -> list[Task]:
-    """Return the evaluation tasks of all methods, those by a random split, and the costs."""
+    """Return the evaluation tasks of all methods, and those by a random split."""
     evaluated = [method_task(plan, name) for name in method_titles(plan)]
     pooled = []
     for name in sample_tables.pooled_methods(plan):
@@ -75,12 +65,11 @@ def tasks(plan: StudyPlan) -> list[Task]:
         pooled.append(
             Task(f"pooled/{name}", evaluate_pooled, arguments, ConfusionCounts, cost=cost)
         )
-    return [*evaluated, *pooled, *costs.tasks(plan)]
+    return [*evaluated, *pooled]
 
 
 def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     """Return all tables of the comparison that have rows."""
-    # Without a truth there are no grip forces and directions.
     made = [make(plan, results) for make in TABLES]
     return [table for table in made if table.rows]
 
@@ -91,7 +80,6 @@ def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
         accuracy_figure(plan, results),
         alarm_figure(plan, results),
         reliability_figure(plan, results),
-        *error_figures(plan, results),
     ]
 
 
@@ -158,46 +146,6 @@ def reliability_figure(plan: StudyPlan, results: Results) -> ReportFigure:
         notes[title] = "" if brier is None else f"Brier {brier:.3f}"
     caption = "Reliability of the probabilities, by recording. On the dotted line they are right."
     return ReportFigure("reliability", caption, draw_reliability(curves, notes))
-
-
-def error_figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
-    """Return the errors by grip force and by direction; none without a truth."""
-    made = []
-    rows = sample_tables.force(plan, results).rows
-    groups = {
-        kind: _groups(plan, [row for row in rows if row.keys["error"] == kind], "grip")
-        for kind in sample_tables.ERROR_KINDS
-    }
-    if any(groups.values()):
-        caption = (
-            "Errors by grip force, by recording. The paper states that grip force has no influence."
-        )
-        made.append(ReportFigure("grip", caption, draw_groups(groups, "samples [%]")))
-    rows = sample_tables.directions(plan, results).rows
-    by_direction = _groups(plan, rows, "direction")
-    if by_direction:
-        caption = (
-            "Disturbances called stable, by direction, by recording. The paper states that "
-            "disturbances in all directions are found."
-        )
-        drawn = draw_groups(
-            {"direction of the push": by_direction}, "disturbed, called stable [%]", per_row=1
-        )
-        made.append(ReportFigure("directions", caption, drawn))
-    return made
-
-
-def _groups(
-    plan: StudyPlan, rows: Sequence[Row], key: str
-) -> dict[str, Mapping[str, IntervalEstimate]]:
-    """Return the values of the rows by recording, by method and by the values of `key`."""
-    shown = [row for row in rows if row.keys["on"] == SPLIT_TITLES["recording"]]
-    drawn = {
-        title: _estimates([r for r in shown if short_title(str(r.keys["method"])) == title], key)
-        for name, title in short_titles(plan).items()
-        if name in DETAIL_METHODS
-    }
-    return {title: values for title, values in drawn.items() if values}
 
 
 def _estimates(rows: Sequence[Row], key: str) -> dict[str, IntervalEstimate]:

@@ -16,7 +16,6 @@ from holdfast_lab.study.comparison.jobs import (
 )
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
 from holdfast_lab.study.evaluation.alarms import READINGS, AlarmStatistics
-from holdfast_lab.study.evaluation.error_breakdown import GlitchCount
 from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED,
     COMPARED_RATE,
@@ -24,6 +23,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     LASTING,
     OWN,
 )
+from holdfast_lab.study.evaluation.held_object import GlitchCount
 from holdfast_lab.study.plan import StudyPlan
 
 SHOWN_THRESHOLDS = (OWN, LASTING, COMPARED)

@@ -1,7 +1,6 @@
 """The evaluation jobs of the study: which methods, on which recordings, at which size."""
 
 from collections.abc import Iterator, Mapping
-from importlib.util import find_spec
 from typing import Any
 
 from holdfast_lab.study.evaluation.evaluate_method import (
@@ -11,7 +10,6 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     MethodEvaluation,
     evaluate_method,
 )
-from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import METHODS, PAPER_FAMILY
 from holdfast_lab.study.plan import StudyPlan
 from holdfast_lab.tasks import Task
@@ -22,8 +20,7 @@ MAIN_METHODS = (*PAPER_FAMILY, "zhang", "holdfast", "noise_floor", "always_stabl
 """Methods that are evaluated on every corpus."""
 QUICK_METHODS = (*PAPER_FAMILY, "holdfast")
 """Those of them that a quick study evaluates on every corpus."""
-NETWORK = "tcn"
-SLOW_METHODS = ("jl_local_svm", "jl_global_svm", NETWORK)
+SLOW_METHODS = ("jl_local_svm", "jl_global_svm")
 """Methods that a quick study leaves out."""
 METHOD_SECONDS = {
     "svm": 60.0,
@@ -31,15 +28,12 @@ METHOD_SECONDS = {
     "trees": 300.0,
     "jl_local_svm": 150.0,
     "jl_global_svm": 230.0,
-    NETWORK: 6000.0,
 }
 """Approximate duration of the slow evaluations [s]."""
 DEFAULT_SECONDS = 30.0
 """Approximate duration of the other evaluations [s]."""
 
 QUICK_EFFORT = EvaluationEffort(folds=3, inner=2, max_samples=10_000)
-NETWORK_EFFORT = EvaluationEffort(folds=2, inner=2, stride=3, max_samples=6_000)
-"""A fit of the network takes a minute for 20,000 windows of a finger."""
 
 SPLIT_TITLES = {
     "recording": "by recording",
@@ -65,7 +59,7 @@ def method_titles(plan: StudyPlan) -> dict[str, str]:
 
     Methods for whole hands are left out if there is one finger.
     """
-    left_out = SLOW_METHODS if plan.quick else () if is_torch_installed() else (NETWORK,)
+    left_out = SLOW_METHODS if plan.quick else ()
     one_finger = len(plan.main.fingers) < 2
     return {
         name: method.title
@@ -84,42 +78,15 @@ def short_title(title: str) -> str:
     return title.split(" (", maxsplit=1)[0]
 
 
-def is_torch_installed() -> bool:
-    """Return whether torch, which the network needs, is installed."""
-    return find_spec("torch") is not None
-
-
-def network_note(plan: StudyPlan) -> str:
-    """Return a note on how the network was evaluated, or why it was not."""
-    if plan.quick:
-        return "Left out of a quick study: the TCN and the linear SVMs of James & Lepora."
-    if not is_torch_installed():
-        return "Left out: the TCN, because torch is not installed (pip install 'holdfast[deep]')."
-    effort = NETWORK_EFFORT
-    return (
-        f"The TCN is evaluated at a smaller size: {effort.folds} folds, {effort.max_samples:,} "
-        f"windows of a finger to train, every {effort.stride}rd sample evaluated. It is trained "
-        "until the loss of held-out training recordings has stopped falling."
-    )
-
-
 def method_task(plan: StudyPlan, method: str) -> Task:
     """Return the task that evaluates a method on all corpora that the plan has for it."""
-    return evaluation_task(f"methods/{method}", method_job(plan, method), quick=plan.quick)
-
-
-def evaluation_task(name: str, job: EvaluationJob, *, quick: bool = False) -> Task:
-    """Return a task that does a job, with an approximate cost for recordings of the twin [s].
-
-    Args:
-        name: of the task.
-        job: to do.
-        quick: whether the study is quick, with fewer folds.
-    """
+    job = method_job(plan, method)
     parts = len(job.splits) + 0.5 * len(job.tests)
-    seconds = METHOD_SECONDS.get(job.method, DEFAULT_SECONDS) * parts / 2.5
-    cost = seconds * (0.5 if quick else 1.0)
-    return Task(name, evaluate_method, (job,), dict[str, MethodEvaluation], cost=cost)
+    # For recordings of the twin [s]; a quick study has fewer folds.
+    seconds = METHOD_SECONDS.get(method, DEFAULT_SECONDS) * parts / 2.5
+    cost = seconds * (0.5 if plan.quick else 1.0)
+    result = dict[str, MethodEvaluation]
+    return Task(f"methods/{method}", evaluate_method, (job,), result, cost=cost)
 
 
 def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
@@ -137,22 +104,14 @@ def method_job(plan: StudyPlan, method: str) -> EvaluationJob:
         plan.main,
         splits,
         tests,
-        Variation(),
-        method_effort(plan, method),
+        method_effort(plan),
         plan.seed,
-        compared_methods(plan),
+        tuple(method_titles(plan)),
     )
 
 
-def compared_methods(plan: StudyPlan) -> tuple[str, ...]:
-    """Return the names of the methods that are compared on the same samples."""
-    return tuple(method_titles(plan))
-
-
-def method_effort(plan: StudyPlan, method: str) -> EvaluationEffort:
+def method_effort(plan: StudyPlan) -> EvaluationEffort:
     """Return the size of the evaluation of a method."""
-    if method == NETWORK:
-        return NETWORK_EFFORT
     return QUICK_EFFORT if plan.quick else EvaluationEffort()
 
 

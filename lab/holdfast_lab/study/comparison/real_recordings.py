@@ -8,9 +8,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from holdfast_interop.importers import uskin_pick_move
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
-from holdfast_lab.study.comparison.jobs import NETWORK, Results, method_titles
+from holdfast_lab.study.comparison.jobs import Results, method_titles
 from holdfast_lab.study.comparison.real_counts import (
     AUC,
     COUNT_DIGITS,
@@ -110,13 +109,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
         for making in MODELS
     ]
     methods = [
-        Task(
-            _task_name(name),
-            method_estimates,
-            (name, plan.real, plan.seed),
-            result,
-            (120.0 if name == NETWORK else 5.0),
-        )
+        Task(_task_name(name), method_estimates, (name, plan.real, plan.seed), result, cost=5.0)
         for name in real_methods(plan, plan.real)
     ]
     return [read, *models, *methods]
@@ -147,12 +140,6 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
         finger_auc_table(by_line, plan.seed),
         pair_table(lines, results[LABELS], estimates, plan.seed),
     ]
-
-
-def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
-    """Return no figure."""
-    del plan, results
-    return []
 
 
 def real_methods(plan: StudyPlan, real: Corpus) -> dict[str, str]:

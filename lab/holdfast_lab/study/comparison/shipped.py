@@ -22,10 +22,8 @@ from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.teaching import teach
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.study.comparison.rows import RowKeys, count_row, quantile_row, ratio_row
-from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
@@ -91,7 +89,7 @@ Counted = dict[str, list[ModelCounts]]
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return a task for each model; none without recordings of the twin and other objects."""
     tests = {role: plan.corpora[role] for role in TESTED if role in plan.corpora}
-    if not tests or not has_truth(plan.main.load()[0]):
+    if not tests or not plan.main.has_truth:
         return []
     made = [
         Task(f"shipped/{name}", shipped_counts, (name, tests), Counted, cost=10.0)
@@ -137,12 +135,6 @@ def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
         ResultTable("slip_speeds", "Delay by the speed of the slip", speed_note, by_speed,
                     ("on", "model", "speed [mm/s]"), digits=3, digits_of=digits),
     ]  # fmt: skip
-
-
-def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-    """Return no figures."""
-    del plan, results
-    return []
 
 
 def model_title(task: str) -> str:

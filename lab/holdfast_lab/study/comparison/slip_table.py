@@ -13,7 +13,6 @@ from holdfast.metrics.slips import (
     SlipMetrics,
 )
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
 from holdfast_lab.study.comparison.rows import RowKeys
@@ -87,7 +86,7 @@ def tasks(plan: StudyPlan) -> list[Task]:
     for name in names:
         # By object where objects are known; the split by recording only stands in for it.
         job = EvaluationJob(
-            name, plan.main, ("object", "recording"), tests, effort=method_effort(plan, name),
+            name, plan.main, ("object", "recording"), tests, effort=method_effort(plan),
             seed=plan.seed, compared=names, slips=True,
         )  # fmt: skip
         cost = TASK_SECONDS.get(name, OTHER_SECONDS) * (0.5 if plan.quick else 1.0)
@@ -114,27 +113,18 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
                 evaluation = evaluations[corpus.name]
                 keys = {"on": SPLIT_TITLES[evaluation.split or role], **method_keys(name)}
                 rows += slip_rows({**keys, BUDGET: HELD_BUDGET}, evaluation)
-                if evaluation.quiet_budget is not None:
-                    quiet = msgspec.structs.replace(evaluation, summary=evaluation.quiet_budget)
-                    rows += slip_rows({**keys, BUDGET: QUIET_BUDGET}, quiet)
-    return [slip_table(rows, ("on", BUDGET, FITTED_TO, METHOD))] if rows else []
-
-
-def figures(plan: StudyPlan, results: Results) -> list[ReportFigure]:
-    """Return no figures."""
-    del plan, results
-    return []
+                quiet = msgspec.structs.replace(evaluation, summary=evaluation.quiet_budget)
+                rows += slip_rows({**keys, BUDGET: QUIET_BUDGET}, quiet)
+    if not rows:
+        return []
+    lines = ("on", BUDGET, FITTED_TO, METHOD)
+    return [ResultTable("slips", "Slips of fingers", SLIP_NOTE, rows, lines, digits_of=SLIP_DIGITS)]
 
 
 def method_keys(name: str) -> dict[str, Key]:
     """Return the keys of the rows of a method."""
     slip_method = SLIP_METHODS[name]
     return {FITTED_TO: TARGET_TITLES[slip_method.target], METHOD: slip_method.method.title}
-
-
-def slip_table(rows: list[Row], lines: tuple[str, ...], note: str = SLIP_NOTE) -> ResultTable:
-    """Return the table of slips with these rows."""
-    return ResultTable("slips", "Slips of fingers", note, rows, lines, digits_of=SLIP_DIGITS)
 
 
 def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:

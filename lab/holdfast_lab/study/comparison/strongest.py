@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import HELD_PHASES
 from holdfast.metrics import Metrics
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
@@ -151,14 +150,10 @@ def sample_errors(metrics: Metrics | None) -> CountPairs | None:
 
 def held_errors(evaluation: MethodEvaluation) -> CountPairs | None:
     """Return the errors of fingers while the hand holds the object."""
-    if evaluation.fingers is None or not any(each.phases for each in evaluation.breakdown):
-        return None
     # Before the grasp and after the release every method is right, which hides the differences.
-    counts = []
-    for breakdown in evaluation.breakdown:
-        grasped = [breakdown.phases.get(str(phase), (0, 0)) for phase in HELD_PHASES]
-        counts.append((sum(wrong for _, wrong in grasped), sum(n for n, _ in grasped)))
-    return counts
+    if evaluation.fingers is None:
+        return None
+    return [(n_wrong, n) for n, n_wrong in evaluation.held]
 
 
 def missed_events(reading: str) -> Callable[[MethodEvaluation], CountPairs]:

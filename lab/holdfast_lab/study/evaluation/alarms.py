@@ -42,12 +42,6 @@ class AlarmLabels(NamedTuple):
     glitch: Mask
     left_out: Mask
 
-    @classmethod
-    def of(cls, labels: Codes) -> Self:
-        """Return labels without glitches."""
-        nowhere = np.zeros(len(labels), dtype=np.bool_)
-        return cls(labels, nowhere, nowhere)
-
 
 def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
     """Return the exact labels of the hand for each of `READINGS`.
@@ -116,16 +110,6 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
             n_of_glitch=int((is_stable & labels.glitch[at]).sum()),
             stable_seconds=match.stable_seconds - float(left_out.sum()),
         )
-
-    @classmethod
-    def total(cls, parts: Sequence[Self]) -> Self:
-        """Return the statistics of all parts together."""
-        sums = {
-            # All fields but the first, the delays, are sums.
-            name: sum(getattr(part, name) for part in parts)
-            for name in cls.__struct_fields__[1:]
-        }
-        return cls([delay for part in parts for delay in part.delays], **sums)
 
     def n_missed(self, post: float) -> int:
         """Return the number of events without an alarm until onset + post [s]."""

@@ -30,26 +30,20 @@ from holdfast_lab.study.evaluation.alarms import (
     labels_by_reading,
     threshold_shift,
 )
-from holdfast_lab.study.evaluation.error_breakdown import (
-    CountPair,
-    ErrorBreakdown,
-    GlitchCount,
-    break_down_errors,
-    count_glitches,
-)
 from holdfast_lab.study.evaluation.fitted_method import (
     FittedMethod,
     MethodTraining,
     ScoredRecording,
 )
-from holdfast_lab.study.evaluation.recording_features import (
-    RecordingFeatures,
-    Variation,
-    corpus_features,
+from holdfast_lab.study.evaluation.held_object import (
+    CountPair,
+    GlitchCount,
+    count_glitches,
+    held_errors,
 )
+from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, corpus_features
 from holdfast_lab.study.methods import HAND, METHODS, Method, hand_signal
 from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
-from holdfast_lab.study.methods.wavelets import CUTS
 from holdfast_lab.study.plan import Corpus
 
 FALSE_ALARM_RATES = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
@@ -76,8 +70,8 @@ GroupSplit = Literal["recording", "object"]
 
 
 def find_method(name: str) -> Method:
-    """Return the method of that name, of `METHODS`, `CUTS` or `SLIP_METHODS`."""
-    return METHODS.get(name) or CUTS.get(name) or SLIP_METHODS[name].method
+    """Return the method of that name, of `METHODS` or `SLIP_METHODS`."""
+    return METHODS.get(name) or SLIP_METHODS[name].method
 
 
 @lru_cache
@@ -116,13 +110,11 @@ class EvaluationEffort(msgspec.Struct, frozen=True):
     Attributes:
         folds: of whole recordings. Each object is spread over all folds.
         inner: folds of the training recordings of each fold, on which thresholds are chosen.
-        stride: evaluate every n-th sample.
         max_samples: of a unit, that train a classifier; evenly thinned.
     """
 
     folds: int = 5
     inner: int = 3
-    stride: int = 1
     max_samples: int = 20_000
 
 
@@ -134,7 +126,6 @@ class EvaluationJob(msgspec.Struct, frozen=True):
         train: corpus that the method is fitted to.
         splits: of that corpus. A fold leaves out recordings, or all recordings of one object.
         tests: other corpora, evaluated with a fit to all of `train`.
-        variation: of the recordings of all corpora.
         effort: size of the evaluation.
         seed: of all random numbers.
         compared: names of the methods that must have an estimate too where this one is scored.
@@ -146,7 +137,6 @@ class EvaluationJob(msgspec.Struct, frozen=True):
     train: Corpus
     splits: tuple[GroupSplit, ...] = ("recording",)
     tests: tuple[Corpus, ...] = ()
-    variation: Variation = Variation()
     effort: EvaluationEffort = EvaluationEffort()
     seed: int = 0
     compared: tuple[str, ...] = ()
@@ -154,10 +144,8 @@ class EvaluationJob(msgspec.Struct, frozen=True):
 
     def features(self, corpus: Corpus) -> list[RecordingFeatures]:
         """Return the features of the recordings of a corpus."""
-        compared, rate = (self.method, *self.compared), self.train.rate / self.variation.every
-        longest = max(warm_up(name, rate) for name in compared)
-        method, stride = find_method(self.method), self.effort.stride
-        featured = corpus_features(method, corpus, self.variation, stride, longest)
+        longest = max(warm_up(name, self.train.rate) for name in (self.method, *self.compared))
+        featured = corpus_features(find_method(self.method), corpus, longest)
         return [recording for recording in featured if recording.slips or not self.slips]
 
     def training(self, recordings: Sequence[RecordingFeatures]) -> MethodTraining:
@@ -178,7 +166,7 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
         hand_without_estimate: the same for the hand.
         readings: alarms of the hand by exact labels, for each of `READINGS` and each threshold.
         glitches: of the hand's controller.
-        breakdown: of the errors at the method's own threshold.
+        held: samples while the hand holds the object, and the errors among them.
         calibration: (10, 3) sum of probabilities, stable samples and all samples of each bin.
     """
 
@@ -188,7 +176,7 @@ class MethodEvaluation(msgspec.Struct, frozen=True):
     hand_without_estimate: list[CountPair]
     readings: dict[str, dict[str, list[AlarmStatistics]]]
     glitches: list[GlitchCount]
-    breakdown: list[ErrorBreakdown]
+    held: list[CountPair]
     calibration: list[list[list[float]]]
 
     @property
@@ -311,7 +299,7 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
         hand_without_estimate=[_n_without_estimate(_as_hand(decisions)) for decisions in every],
         readings=alarms,
         glitches=[count_glitches(truth) for truth in truths],
-        breakdown=list(map(break_down_errors, truths, decided)),
+        held=list(map(held_errors, truths, decided)),
         calibration=[calibration_sums(list(d.fingers.values())).tolist() for d in decided],
     )
 
@@ -335,7 +323,7 @@ def evaluate_pooled(job: EvaluationJob) -> list[list[int]]:
     else is as in the other splits, so that the difference is due to the split alone.
 
     Args:
-        job: gives a method for fingers, the training corpus, the variation, effort and seed.
+        job: gives a method for fingers, the training corpus, effort and seed.
     """
     recordings = job.features(job.train)
     generator = np.random.default_rng(job.seed)

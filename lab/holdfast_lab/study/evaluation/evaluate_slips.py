@@ -46,14 +46,13 @@ class SlipEvaluation(msgspec.Struct, frozen=True):
         split: `object` or `recording`; empty for another corpus.
         n_recordings: in which slips are known.
         summary: of the slips, by fingers and pooled, at the threshold for all held time.
-        quiet_budget: the same at the threshold for quiet hold alone; None where only the first
-            is chosen.
+        quiet_budget: the same at the threshold for quiet hold alone.
     """
 
     split: str
     n_recordings: int
     summary: SlipSummary
-    quiet_budget: SlipSummary | None = None
+    quiet_budget: SlipSummary
 
 
 def evaluate_slips(job: EvaluationJob) -> dict[str, SlipEvaluation]:
@@ -199,6 +198,6 @@ def summarise_slips(
         summarise_choice(curves, choice, groups=groups, training=training, seed=seed)
         for choice in (CHOICE, QUIET_CHOICE)
     )
-    if summary is None:
+    if summary is None or quiet_budget is None:
         raise ValueError("recordings with known slips expected")
     return SlipEvaluation(split, len(curves), summary, quiet_budget)

@@ -1,13 +1,11 @@
 """The features that a method computes from the recordings of a corpus, with their labels."""
 
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import attrgetter
 from typing import Any, NamedTuple, Self
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -25,49 +23,12 @@ from holdfast.metrics.slip_truth import (
     truth_without,
 )
 from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Tactile, Truth, label_states
+from holdfast.recordings import Recording, Truth, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.kept import WORKER_MEMORY
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
-
-
-class Variation(msgspec.Struct, frozen=True):
-    """A variation of recordings before training and testing. The default changes nothing.
-
-    Attributes:
-        noise: standard deviation of white noise added to every reading [unit of the readings].
-            Counts stay integers.
-        every: keep only every n-th sample, as a slower sensor of the same kind gives them.
-    """
-
-    noise: float = 0.0
-    every: int = 1
-
-    def apply(self, recording: Recording) -> Recording:
-        """Return the varied recording. The same recording always gets the same noise."""
-        if self == Variation():
-            return recording
-        modules: dict[str, Tactile] = {}
-        for index, (name, module) in enumerate(recording.modules.items()):
-            readings = np.asarray(module.readings, dtype=np.float64)
-            if self.noise:
-                # Seeded by the name, so that the noise is the same in any part of a corpus.
-                seed = [zlib.crc32(recording.name.encode()), index]
-                noise = np.random.default_rng(seed).normal(0.0, self.noise, size=readings.shape)
-                readings = readings + noise
-                readings = np.rint(readings) if module.unit == "count" else readings
-            modules[name] = replace(
-                module,
-                times=module.times[:: self.every],
-                readings=readings[:: self.every],
-                sensor=replace(module.sensor, rate=module.sensor.rate / self.every),
-            )
-        return replace(recording, modules=modules)
-
-
-UNCHANGED = Variation()
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,25 +104,20 @@ class RecordingFeatures:
             features={},
         )
 
-    def scored_at(self, scored: Mapping[str, Mask], stride: int) -> "RecordingFeatures":
-        """Return every n-th sample of the fingers, scored where a mask is True."""
+    def scored_at(self, scored: Mapping[str, Mask]) -> "RecordingFeatures":
+        """Return the recording, scored where the mask of a finger is True."""
         changed: dict[str, Any] = {
-            field: {name: array[::stride] for name, array in getattr(self, field).items()}
-            for field in ("times", "amplitude", "labels")
-        }
-        for field in ("scored_labels", "exact_labels", "calm_labels"):
-            changed[field] = {
-                name: np.where(scored[name], codes, UNKNOWN)[::stride]
+            field: {
+                name: np.where(scored[name], codes, UNKNOWN)
                 for name, codes in getattr(self, field).items()
             }
-        changed["slips"] = {}
-        for name, truth in self.slips.items():
-            # Before the stride, because a slip is one of consecutive samples.
-            known = truth_without(self.times[name], truth, ~scored[name])
-            changed["slips"][name] = replace(
-                known, codes=known.codes[::stride], quiet=known.quiet[::stride]
-            )
-        return replace(self, **changed)
+            for field in ("scored_labels", "exact_labels", "calm_labels")
+        }
+        slips = {
+            name: truth_without(self.times[name], truth, ~scored[name])
+            for name, truth in self.slips.items()
+        }
+        return replace(self, slips=slips, **changed)
 
     def unit_labels(self, unit: str) -> Codes:
         """Return the labels that train a unit: for the hand, at the times of the first finger."""
@@ -229,8 +185,6 @@ class PreparedRecording(NamedTuple):
 def corpus_features(
     method: Method,
     corpus: Corpus,
-    variation: Variation = UNCHANGED,
-    stride: int = 1,
     warm_up: float = 0.0,
 ) -> list[RecordingFeatures]:
     """Return the features of all recordings of a corpus that have one of its fingers.
@@ -238,12 +192,10 @@ def corpus_features(
     Args:
         method: computes the features.
         corpus: the recordings.
-        variation: applied to each recording first.
-        stride: keep the features of every n-th sample. They are computed from all samples.
         warm_up: time at the start of every unbroken stretch that is not scored [s].
     """
     featured = []
-    for hand, labelled in prepared_recordings(corpus, variation):
+    for hand, labelled in prepared_recordings(corpus):
         scored: dict[str, Mask] = {}
         for name, finger in hand.fingers.items():
             times = finger.times
@@ -254,24 +206,19 @@ def corpus_features(
                 begin = times[rows.start] + warm_up - 0.5 / hand.rate
                 scored[name][rows] = times[rows] >= begin
         features = {
-            unit: np.asarray(rows[::stride], dtype=np.float32)
-            for unit, rows in method.features(hand).items()
+            unit: np.asarray(rows, dtype=np.float32) for unit, rows in method.features(hand).items()
         }
-        featured.append(replace(labelled.scored_at(scored, stride), features=features))
+        featured.append(replace(labelled.scored_at(scored), features=features))
     return featured
 
 
-def prepared_recordings(
-    corpus: Corpus, variation: Variation = UNCHANGED
-) -> Iterator[PreparedRecording]:
+def prepared_recordings(corpus: Corpus) -> Iterator[PreparedRecording]:
     """Yield the recordings of a corpus that have one of its fingers, in order.
 
-    A process prepares a recording once, as long as it has memory; see `kept`. A recording that
-    is varied is not kept.
+    A process prepares a recording once, as long as it has memory; see `kept`.
 
     Args:
         corpus: gives the recordings, the fingers and the tare.
-        variation: applied to each recording first.
     """
     tare = Tare.parse(corpus.tare)
     for recording in corpus.load():
@@ -279,9 +226,6 @@ def prepared_recordings(
         fingers = tuple(f for f in corpus.fingers if f in modules and modules[f].n_samples)
         if not fingers:
             continue
-        prepare = partial(PreparedRecording.of, variation.apply(recording), tare, fingers)
-        if variation != UNCHANGED:
-            yield prepare()
-        else:
-            key = (*corpus.identity, recording.name, fingers, corpus.tare)
-            yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
+        prepare = partial(PreparedRecording.of, recording, tare, fingers)
+        key = (*corpus.identity, recording.name, fingers, corpus.tare)
+        yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))

@@ -8,7 +8,7 @@ from holdfast_lab.study.methods.force_rules import (
     TANGENTIAL,
 )
 from holdfast_lab.study.methods.holdfast import HOLDFAST
-from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA, TCN
+from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA
 from holdfast_lab.study.methods.method import (
     HAND,
     FingerSignal,
@@ -49,7 +49,6 @@ METHODS: dict[str, Method] = {
         TANGENTIAL,
         ANYSKIN,
         *JAMES_LEPORA,
-        TCN,
         TREES,
         NOISE_FLOOR,
         ALWAYS_STABLE,

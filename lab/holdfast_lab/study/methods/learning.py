@@ -1,4 +1,4 @@
-"""Learning methods from publications: AnySkin's shear, James & Lepora, Grover's network."""
+"""Learning methods from publications: AnySkin's shear, James & Lepora."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,6 @@ import numpy as np
 from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
 from holdfast.sensors.types import Array
-from holdfast_lab.classifiers.tcn import TemporalConvolution
 from holdfast_lab.study.methods.method import (
     HAND,
     FingerSignal,
@@ -41,17 +40,6 @@ MOTION_STEP = 1 / 60
 """Time over which a motion of taxels is measured [s]: between two images of a usual camera."""
 SUMMARY_FEATURES = 6
 """Features of the motion of a whole fingertip, see `taxel_motion`."""
-
-GROVER_SOURCE = (
-    "Grover et al. 2022, by the released configuration: the network and its "
-    "training, but the three axes of the fingertip force in place of six barometers, and no "
-    "augmentation. Training ends when the loss of a fifth of the training recordings, which are "
-    "held out, has not fallen for 15 epochs"
-)
-N_LEARNING_STEPS = 100
-"""Time steps of the network's window."""
-STEP = 0.01
-"""Time between two steps [s]: the window is one second at 100 Hz."""
 
 
 def shear_features(hand: HandSignal) -> Mapping[str, Array]:
@@ -160,27 +148,6 @@ def _unit(vectors: Array, lengths: Array) -> Array:
     return vectors / np.where(lengths > 0, lengths, 1.0)[..., None]
 
 
-def last_second(hand: HandSignal) -> dict[str, Array]:
-    """Return the force of every finger over the last second, oldest step first, (n, 300).
-
-    Steps are 0.01 s apart at any rate, interpolated linearly between samples; the last step is
-    the sample itself. The result is float32 because it is large. NaN in the first second of a
-    stretch.
-    """
-
-    def of_stretch(finger: FingerSignal) -> Array:
-        features = np.full((len(finger.times), N_LEARNING_STEPS, 3), np.nan)
-        first = finger.times[:1] + (N_LEARNING_STEPS - 1) * STEP - 0.5 / finger.rate
-        full = finger.times >= first
-        at = finger.times[full, None] - STEP * np.arange(N_LEARNING_STEPS)[::-1]
-        if full.any():  # np.interp refuses a stretch without samples
-            for axis in range(3):
-                features[full, :, axis] = np.interp(at, finger.times, finger.force[:, axis])
-        return features.reshape(len(features), 3 * N_LEARNING_STEPS)
-
-    return {name: rows.astype(np.float32) for name, rows in stretchwise(hand, of_stretch).items()}
-
-
 ANYSKIN = Method(
     "anyskin", "AnySkin shear features", "learning", ANYSKIN_SOURCE, shear_features,
     recipe("logreg"),
@@ -199,11 +166,3 @@ JAMES_LEPORA = tuple(
     for classifier, title in (("logreg", "LogReg"), ("svm", "Linear SVM"))
 )
 """Of single fingers (local) and of whole hands (global)."""
-TCN = Method(
-    "tcn",
-    "TCN (Grover et al.)",
-    "learning",
-    GROVER_SOURCE,
-    last_second,
-    TemporalConvolution(),
-)

@@ -15,8 +15,8 @@ from holdfast_lab.study.methods.wavelets import TREES
 Target = Literal["sliding", "stability"]
 """What a method is fitted to: true sliding of a finger, or the labels of stability."""
 
-RIVALS = tuple(name for name in METHODS if name not in ("holdfast", "tcn"))
-"""Names of the other methods, of `METHODS`; the network takes hours."""
+RIVALS = tuple(name for name in METHODS if name != "holdfast")
+"""Names of the other methods, of `METHODS`."""
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,10 @@
 - `ENERGY`: a threshold on the energy of the details of F_a, without their mean taken out.
 - `TREES`: boosted trees on the paper's six features, as an upper limit of what they hold.
 - `ZHANG`: the energy of the details of the normal force.
-- `CUTS`: one feature and one threshold, sigma against energies.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from operator import attrgetter
 
 import numpy as np
 
@@ -57,8 +55,6 @@ ZHANG_SOURCE = (
     "two thresholds by experiment, one for slip by gravity and one for disturbances; here one is "
     "fitted"
 )
-CUTS_SOURCE = "for one question of the study: the exact best threshold on one feature, N_w = 14"
-
 MIN_LOG_ARGUMENT = 1e-9
 """Smallest sigma [count or N] or energy [count^2 or N^2] that enters a logarithm."""
 
@@ -108,29 +104,19 @@ def detail_energy(values: Array, window: int = DEFAULT_WINDOW) -> Array:
     return windowed(values, check_window(window), of_windows)[:, 0]
 
 
-def detail_sigma(values: Array, window: int = DEFAULT_WINDOW) -> Array:
-    r"""Return the paper's sigma of the Haar details over the window that ends at each sample.
+def log_energy(hand: HandSignal) -> Mapping[str, Array]:
+    """Return log10 of the energy of the details of F_a of every finger, (n, 1).
 
-        sigma = sqrt(sum (d - mean d)^2 / N_w),        d = (x_0 - x_1) / sqrt(2)
-
-    Args:
-        values: (n,) of one unbroken stretch, such as F_a [count or N].
-        window: N_w, samples in the window; even.
-
-    Returns:
-        (n,) [count or N]; NaN without a full window.
-
-    Example:
-        >>> detail_sigma(np.array([1.0, 3.0, 3.0, 2.0]), window=4).round(3).tolist()
-        [nan, nan, nan, 0.75]
+    The logarithm changes no threshold. It keeps probabilities from saturating, so that those of
+    several fits can be pooled for an AUC.
     """
 
-    def of_windows(windows: Array) -> Array:
-        details = (windows[:, 0::2] - windows[:, 1::2]) / np.sqrt(2)
-        centred = details - details.mean(axis=1, keepdims=True)
-        return np.asarray(np.sqrt((centred**2).sum(axis=1, keepdims=True) / window))
+    def of_stretch(finger: FingerSignal) -> Array:
+        return np.asarray(
+            np.log10(np.maximum(detail_energy(finger.amplitude), MIN_LOG_ARGUMENT))[:, None]
+        )
 
-    return windowed(values, window, of_windows)[:, 0]
+    return stretchwise(hand, of_stretch)
 
 
 def normal_energy(hand: HandSignal, window: int = DEFAULT_WINDOW) -> dict[str, Array]:
@@ -195,42 +181,6 @@ ZHANG = Method(
 )  # fmt: skip
 
 
-def log_feature(
-    signal: Callable[[FingerSignal], Array], measure: Callable[[Array], Array], hand: HandSignal
-) -> Mapping[str, Array]:
-    """Return log10 of a measure of a signal of every finger, (n, 1).
-
-    The logarithm changes no threshold. It keeps probabilities from saturating, so that those of
-    several fits can be pooled for an AUC.
-    """
-    return stretchwise(
-        hand,
-        lambda finger: np.log10(np.maximum(measure(signal(finger)), MIN_LOG_ARGUMENT))[:, None],
-    )
-
-
 ENERGY = Method(
-    "energy", "Haar energy of F_a", "paper", ENERGY_SOURCE,
-    partial(log_feature, attrgetter("amplitude"), detail_energy), Threshold("below"),
+    "energy", "Haar energy of F_a", "paper", ENERGY_SOURCE, log_energy, Threshold("below"),
 )  # fmt: skip
-CUTS = {
-    name: Method(
-        name,
-        title,
-        "vibration",
-        CUTS_SOURCE,
-        partial(log_feature, attrgetter(signal), measure),
-        Threshold("below"),
-    )
-    for name, title, signal, measure in (
-        ("sigma_cut", "sigma of F_a", "amplitude", detail_sigma),
-        ("energy_cut", "energy of F_a", "amplitude", detail_energy),
-        ("energy_x_cut", "energy of F_x (Zhang)", "normal_force", detail_energy),
-    )
-}
-"""Methods of one feature and one threshold, by name.
-
-The paper states that sigma, the standard deviation of the details, measures instability better
-than their energy, because noise adds to the energy. Both are computed here from the same window
-of the same signal, so that nothing else differs.
-"""

@@ -13,8 +13,7 @@ from holdfast.errors import TrainingError
 from holdfast.features import Tare
 from holdfast.plots.time_series import FingerSeries, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
-from holdfast_lab.report.html_report import ReportFigure
-from holdfast_lab.report.result_tables import ResultTable
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.evaluation.fitted_method import MethodTraining
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import METHODS
@@ -65,11 +64,6 @@ def tasks(plan: StudyPlan) -> list[Task]:
     corpora = {role: plan.corpora[role] for role in SEARCH_ORDER if role in plan.corpora}
     arguments = (corpora, first_finger(plan), plan.seed)
     return [Task(TASK, predict_examples, arguments, list[ExampleRecording], cost=5.0)]
-
-
-def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
-    """Return no tables."""
-    return []
 
 
 def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:

@@ -8,8 +8,8 @@ import numpy as np
 from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.style import PAPER
 from holdfast_lab.figures.curves import PlottedCurve, draw_lines
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
+from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.comparison.rows import curve_of
 from holdfast_lab.study.paper import published
 from holdfast_lab.study.paper.pooled_samples import ENERGY_NAME

@@ -9,21 +9,17 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Samples
 from holdfast.classifiers.folds import random_folds
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.recordings import Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors.types import Integers
 from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
-from holdfast_lab.study.evaluation.recording_features import Variation
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy
-from holdfast_lab.study.paper.label_sources import LabelSource, relabelled
 from holdfast_lab.study.plan import Corpus
 
 N_POOLED_PARTS = 25
@@ -53,32 +49,12 @@ class SamplePool:
         return self.samples._replace(features=self.samples.features[:, columns])
 
 
-class Treatment(msgspec.Struct, frozen=True):
-    """A change of all recordings, in training and in test. The default changes nothing.
-
-    Attributes:
-        labels: where labels come from.
-        noise: standard deviation of white noise added to every reading [unit of the readings].
-    """
-
-    labels: LabelSource = "recording"
-    noise: float = 0.0
-
-    def apply(self, recording: Recording, tare: str) -> Recording:
-        """Return the changed recording; labels are made from the readings without added noise."""
-        return Variation(noise=self.noise).apply(relabelled(recording, self.labels, tare))
-
-
-UNTREATED = Treatment()
-
-
 def pool_samples(
     corpus: Corpus,
     rate: float,
     finger: str,
     window: int,
     seed: int,
-    treatment: Treatment = UNTREATED,
 ) -> SamplePool:
     """Return the labelled samples of a finger in a corpus.
 
@@ -88,12 +64,11 @@ def pool_samples(
         finger: name of the finger.
         window: N_w [samples].
         seed: of the parts.
-        treatment: of the recordings.
     """
     # An empty part first, for a corpus in which no recording has the finger.
     samples = [Samples(np.empty((0, len(COLUMNS))), np.empty(0, bool), np.empty(0, np.int64))]
     parts = [np.empty(0, dtype=np.int64)]
-    forces = _corpus_forces(corpus, rate, treatment)
+    forces = _corpus_forces(corpus, rate)
     for number, recording in enumerate(forces):
         if finger not in recording.fingers:
             continue
@@ -120,13 +95,11 @@ class _RecordingForces(NamedTuple):
 
 
 @lru_cache(maxsize=4)
-def _corpus_forces(
-    corpus: Corpus, rate: float, treatment: Treatment
-) -> tuple[_RecordingForces, ...]:
+def _corpus_forces(corpus: Corpus, rate: float) -> tuple[_RecordingForces, ...]:
     """Return the forces of all recordings; a worker reads a corpus once for all its tasks."""
     forces = []
     for original in corpus.load():
-        recording = at_rate(treatment.apply(original, corpus.tare), rate)
+        recording = at_rate(original, rate)
         hand = hand_signal(recording, Tare.parse(corpus.tare))
         fingers = {}
         for name, signal in hand.fingers.items():

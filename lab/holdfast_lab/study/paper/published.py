@@ -1,8 +1,9 @@
 """Values printed in the paper [%], and statements of the paper that contradict each other."""
 
-from typing import NamedTuple
+import csv
+from pathlib import Path
 
-from holdfast_lab.report.result_tables import ResultTable, Row
+from holdfast_lab.report.result_tables import Key, ResultTable, Row
 
 WINDOWS = (4, 6, 8, 10, 12, 14, 16, 18)
 RATES = ("FPR", "FNR", "FDR", "accuracy")
@@ -60,138 +61,19 @@ PUBLISHED_ZHANG: PublishedValues = {"accuracy": 62.7, "FDR": 49.1}
 """"Not more than" and "up to"; the paper gives no window."""
 
 
-class Statement(NamedTuple):
-    """A statement of the paper.
-
-    Attributes:
-        about: subject; statements on the same subject contradict each other.
-        where: place in the paper.
-        says: contents, in short.
-        value: in the statement, if there is one.
-    """
-
-    about: str
-    where: str
-    says: str
-    value: float | None = None
-
-
-def _statements(
-    about: str, *parts: tuple[str, str] | tuple[str, str, float]
-) -> tuple[Statement, ...]:
-    return tuple(Statement(about, *part) for part in parts)
-
-
-STATEMENTS: tuple[Statement, ...] = (
-    *_statements(
-        "accuracy of LogReg",
-        ("Results, first paragraph", "in the training phase", 95.3),
-        ("Table II", "N_w = 14, the window of 'the rest of this work'", 95.0),
-        ("Results, after Table III", "on unseen data", 95.64),
-        ("Discussion, James et al.", "said of the training phase", 95.6),
-        ("Discussion, Grover et al.", "in the training", 95.2),
-        ("Discussion, Grover et al.", "in the online testing", 95.6),
-    ),
-    *_statements(
-        "accuracy of SVM",
-        ("Results, first paragraph", "in the training phase", 96.4),
-        ("Discussion, James et al.", "said of the training phase", 96.0),
-        ("Results, after Table III", "on unseen data", 96.2),
-    ),
-    *_statements(
-        "window of Tables I and III",
-        ("Results, before Table II", "N_w = 14 'for the rest of this work'; so also III"),
-        ("Table II", "N_w = 14: FPR 5.2, FNR 4.7, FDR 5.4, accuracy", 95.0),
-        ("Table III", "F_tip and sigma, without F_a and m: the same four figures", 95.0),
-        ("Table II", "N_w = 18: FPR 4.9, FNR 4.5, FDR 5.1, accuracy", 95.3),
-        ("Table III", "all features: the same four figures as N_w = 18", 95.3),
-        ("Table I", "LogReg: FPR 4.9 and FNR 4.5, those of N_w = 18, not of 14"),
-    ),
-    *_statements(
-        "features of the deployed model",
-        ("Results, after Table II", "m is left out 'for the rest of this work'"),
-        ("Discussion, Zhang et al.", "'our method' with the FDR of all features, m included", 5.1),
-        ("Table III", "FDR without m", 5.0),
-    ),
-    *_statements(
-        "what contributes most",
-        ("Results, before Table III", "'sigma and F_a were the most significant'"),
-        ("Table III", "accuracy without F_a: as with all features", 95.3),
-        ("Table III", "accuracy without F_tip: the larger loss", 93.1),
-    ),
-    *_statements(
-        "F_a or m",
-        ("Results, before Table III", "'slightly better using F_a instead of m'"),
-        ("Table III", "F_a, F_tip, sigma: equal in all four figures to F_tip, m, sigma", 95.3),
-        ("Table III", "accuracy of F_a and sigma; 93.1 with m and sigma", 93.2),
-        ("Table III", "accuracy of F_a and F_tip; 81.4 with F_tip and m", 81.1),
-    ),
-    *_statements(
-        "beyond N_w = 14",
-        ("Results, before Table II", "'relatively unchanged'"),
-        ("Table II", "accuracy gained from 14 to 18", 0.3),
-        ("Table II", "accuracy gained from 10 to 14", 0.4),
-    ),
-    *_statements(
-        "the decision boundary",
-        ("Results, first paragraph", "'a linear kernel SVM and a Logistic Regression'"),
-        ("Discussion, Zhang et al.", "'finding a nonlinear decision boundary'"),
-    ),
-    *_statements(
-        "m and sigma",
-        ("Equations 1 and 2", "sums over the coefficients are divided by N_w"),
-        ("Feature extraction", "a window of N_w samples has N_w / 2 Haar coefficients"),
-        ("Feature extraction, A(k) and D(k)", "m = k - N_w ... k: N_w + 1 terms for N_w samples"),
-        ("Feature extraction, A(k) and D(k)", "coefficients do not depend on the sum's index m"),
-        ("Feature extraction", "'n is the time translation'; no equation has an n"),
-    ),
-    *_statements(
-        "the finger",
-        ("Data collection", "250,000 data 'for one fingertip', which one is not said"),
-        ("Results", "'trained for the rest of the finger': middle and thumb; no fourth finger"),
-    ),
-    *_statements(
-        "the classes",
-        ("Table II", "share of stable data that FPR, FNR, FDR at N_w = 14 imply", 48.9),
-        ("Results, middle finger", "the most that accuracy 95.8 and FDR 12.6 allow", 29.1),
-        ("Discussion, Zhang et al.", "FDR 'up to': about that of calling everything stable", 49.1),
-    ),
-    *_statements(
-        "unseen data",
-        ("Data collection", "80 % of the data train, 20 % test; how they are drawn is not said"),
-        ("Results, after Table III", "'previously unseen data': the 20 % or new recordings?"),
-        ("Figure of the objects", "the same six objects are 'for training and testing'"),
-        ("Table I", "'training confusion matrices': on the data of the fit, or validated?"),
-    ),
-    *_statements(
-        "experiment 2",
-        ("Results", "closed, locked, 'before we started applying disturbances'"),
-        ("Figure of experiment 2", "closed, secured its grip, 'and then released the object'"),
-    ),
-    *_statements(
-        "the unstable class",
-        ("Introduction", "'both slippage and loss of contact'"),
-        ("Data collection", "also the absence of contact, and the closing of the hand"),
-        ("Model selection", "no contact 'can be separated by a small threshold'; none is used"),
-    ),
-)
+STATEMENTS = Path(__file__).with_name("discrepancies.csv")
+"""Statements of the paper: subject, place in the paper, contents in short, value if there is one.
+Those on the same subject contradict each other."""
 
 
 def discrepancies() -> ResultTable:
     """Return the table of statements that contradict each other or leave a question open."""
-    rows = [
-        Row(
-            {
-                "about": statement.about,
-                "where": statement.where,
-                "says": statement.says,
-                "figure": "printed",
-            },
-            ours=None,
-            paper=statement.value,
-        )
-        for statement in STATEMENTS
-    ]
+    rows = []
+    with STATEMENTS.open(encoding="utf-8", newline="") as file:
+        for statement in csv.DictReader(file):
+            printed = statement.pop("printed")
+            keys: dict[str, Key] = {**statement, "figure": "printed"}
+            rows.append(Row(keys, None, float(printed) if printed else None))
     return ResultTable(
         name="discrepancies",
         title="Where the paper disagrees with itself, or leaves open what a repetition needs",

@@ -22,7 +22,7 @@ from holdfast.training.splits import inner_folds
 from holdfast.training.tuning import search
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row
-from holdfast_lab.study.paper.pooled_samples import UNTREATED, SamplePool, Treatment, pool_samples
+from holdfast_lab.study.paper.pooled_samples import SamplePool, pool_samples
 from holdfast_lab.study.plan import Corpus
 
 if TYPE_CHECKING:
@@ -140,7 +140,6 @@ def evaluate_variants(
     budget: FitBudget,
     seed: int,
     thorough: bool,
-    treatment: Treatment = UNTREATED,
 ) -> list[VariantResult]:
     """Evaluate classifiers on one finger and window, by the protocol of the paper.
 
@@ -153,19 +152,17 @@ def evaluate_variants(
         seed: of split and search.
         thorough: test also on the training data, by cross-validation, and, without "others", by
             leaving one object out.
-        treatment: of all recordings.
 
     Raises:
         TrainingError: the finger has labels of one class only.
     """
     rate = corpora["main"].rate
-    main = pool_samples(corpora["main"], rate, finger, window, seed, treatment)
+    main = pool_samples(corpora["main"], rate, finger, window, seed)
     roles = {
         role: on for role, on in (("fresh", FRESH), ("others", UNSEEN_OBJECTS)) if role in corpora
     }
     tests = {
-        on: pool_samples(corpora[role], rate, finger, window, seed, treatment)
-        for role, on in roles.items()
+        on: pool_samples(corpora[role], rate, finger, window, seed) for role, on in roles.items()
     }
     return [_evaluate(main, tests, variant, budget, seed, thorough) for variant in variants]
 

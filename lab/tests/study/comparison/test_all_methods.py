@@ -3,19 +3,15 @@ import numpy as np
 import pytest
 
 from holdfast_lab.report.result_tables import to_json
-from holdfast_lab.report.table_layouts import to_html, to_latex
+from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison import (
     all_methods,
-    costs,
     jobs,
     real_recordings,
     sample_tables,
-    sensitivity,
     strongest,
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
-from holdfast_lab.study.comparison.sample_tables import force_quartiles
-from holdfast_lab.study.evaluation.error_breakdown import ErrorBreakdown, GripErrors
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
@@ -26,7 +22,7 @@ pytestmark = pytest.mark.slow
 FEW = ("logreg", "logreg_unweighted", "holdfast", "zhang", "jl_global_logreg")
 TABLES = (
     "strongest", "methods", "hands", "events", "glitches", "glitch_rates", "splits",
-    "phases", "force", "directions", "reliability", "cost",
+    "reliability",
 )  # fmt: skip
 
 
@@ -53,15 +49,11 @@ def few():
     """Reduce the study to few methods, folds and samples."""
     chosen = {name: METHODS[name] for name in FEW}
     with pytest.MonkeyPatch.context() as patch:
-        for module in (jobs, sample_tables, all_methods, sensitivity):
+        for module in (jobs, sample_tables, all_methods):
             patch.setattr(module, "METHODS", chosen)
         patch.setattr(
             jobs, "EvaluationEffort", lambda: EvaluationEffort(folds=2, inner=2, max_samples=500)
         )
-        patch.setattr(costs, "N_UPDATES", 50)
-        patch.setattr(sensitivity, "VARIED_METHODS", ("logreg",))
-        patch.setattr(sensitivity, "NOISE_LEVELS", (0.0, 2.0))
-        patch.setattr(sensitivity, "SAMPLE_STEPS", (1, 5))
         yield
 
 
@@ -79,7 +71,7 @@ def results_of(tasks):
 
 @pytest.fixture(scope="module")
 def results(plan, few):
-    return results_of([*all_methods.tasks(plan), *sensitivity.tasks(plan)])
+    return results_of(all_methods.tasks(plan))
 
 
 @pytest.fixture(scope="module")
@@ -93,7 +85,7 @@ def rows_of(table, **keys):
 
 def test_names_of_tasks_are_unique_over_all_parts(plan, few):
     both = StudyPlan(plan.corpora, real=plan.main)
-    tasks = [*all_methods.tasks(both), *sensitivity.tasks(both), *real_recordings.tasks(both)]
+    tasks = [*all_methods.tasks(both), *real_recordings.tasks(both)]
     names = [task.name for task in tasks]
     assert len(set(names)) == len(names)
     assert all(task.cost > 0 for task in tasks)
@@ -103,7 +95,7 @@ def test_the_tables_can_be_laid_out(tables):
     assert tuple(tables) == TABLES
     for table in tables.values():
         assert table.rows and table.note
-        assert to_html(table) and to_latex(table) and to_json(table)
+        assert to_markdown(table) and to_json(table)
 
 
 def test_every_method_by_every_split(tables):
@@ -248,48 +240,11 @@ def test_the_random_split_has_the_value_of_the_paper(tables):
     assert {r.keys["split"] for r in tables["splits"].rows} >= {"random", "by recording"}
 
 
-def test_every_part_of_the_errors_has_its_methods(tables):
-    assert {row.keys["phase"] for row in tables["phases"].rows} >= {"locked", "disturbed"}
-    assert {row.keys["direction"] for row in tables["directions"].rows} == {"down"}
-    methods = {row.keys["method"] for row in tables["force"].rows}
-    assert methods == {METHODS[name].title for name in FEW if not METHODS[name].whole_hand}
-    assert "down 4" in tables["directions"].note
-
-
-def test_quartiles_of_the_force_of_holding_fingers():
-    grips = [GripErrors(force, (1, 0), (1, 0)) for force in (0.01, 1.0, 2.0, 3.0, 4.0, 5.0)]
-    parts = [ErrorBreakdown({}, grips[:3], []), ErrorBreakdown({}, grips[3:], [])]
-    assert force_quartiles(parts).tolist() == [2.0, 3.0, 4.0]
-
-
-def test_costs_are_positive(tables):
-    assert all(row.ours > 0 and row.interval is None for row in tables["cost"].rows)
-    live = [row.keys["method"] for row in tables["cost"].rows if "live" in row.keys["figure"]]
-    assert live == [METHODS[name].title for name in ("logreg", "holdfast")]
-
-
 def test_the_figures_can_be_drawn(plan, results):
     drawn = all_methods.figures(plan, results)
-    assert [each.name for each in drawn] == [
-        "methods", "alarms", "reliability", "grip", "directions",
-    ]  # fmt: skip
+    assert [each.name for each in drawn] == ["methods", "alarms", "reliability"]
     for each in drawn:
         each.figure.draw_without_rendering()
-
-
-def test_without_torch_the_network_is_left_out_and_the_note_says_how_to_install_it(
-    plan, monkeypatch
-):
-    monkeypatch.setattr(jobs, "METHODS", METHODS)
-    monkeypatch.setattr(jobs, "find_spec", lambda _: None)
-    assert "tcn" not in jobs.method_titles(plan)
-    assert "pip install 'holdfast[deep]'" in jobs.network_note(plan)
-    monkeypatch.setattr(jobs, "find_spec", lambda _: object())
-    assert "tcn" in jobs.method_titles(plan)
-    assert "6,000 windows" in jobs.network_note(plan)
-    job = jobs.method_job(plan, "tcn")
-    assert (job.effort.stride, job.splits) == (3, ("recording", "object"))
-    assert "tcn" in job.compared
 
 
 def test_a_quick_study_evaluates_less(plan, monkeypatch):
@@ -303,38 +258,3 @@ def test_a_quick_study_evaluates_less(plan, monkeypatch):
     assert sum(t.cost for t in all_methods.tasks(quick)) < sum(
         t.cost for t in all_methods.tasks(plan)
     )
-
-
-# Sensitivity, on the same recordings.
-
-
-def test_without_a_variation_the_job_is_that_of_the_comparison(plan, few):
-    by_name = {task.name: task for task in [*all_methods.tasks(plan), *sensitivity.tasks(plan)]}
-    base, plain = by_name["methods/logreg"], by_name["sensitivity/logreg/noise-0/every-1"]
-    assert (base.function, base.arguments) == (plain.function, plain.arguments)
-
-
-def test_tables_and_figures_of_the_conditions(plan, results):
-    tables = {table.name: table for table in sensitivity.tables(plan, results)}
-    assert tuple(tables) == ("noise", "rates", "sigma_energy")
-    for table in tables.values():
-        assert to_html(table) and to_json(table)
-    noise = rows_of(tables["noise"], method=METHODS["logreg"].title, figure="accuracy [%]")
-    assert [row.keys["noise"] for row in noise] == [0.0, 2.0]
-    rates = rows_of(tables["rates"], method=METHODS["logreg"].title, figure="accuracy [%]")
-    assert [row.keys["rate [Hz]"] for row in rates] == [30.0, 150.0]
-    drawn = sensitivity.figures(plan, results)
-    assert [each.name for each in drawn] == [
-        "noise_curves", "rates_curves", "sigma_energy_curves",
-    ]  # fmt: skip
-    for each in drawn:
-        each.figure.draw_without_rendering()
-
-
-def test_sigma_beside_energy_is_compared_in_pairs(plan, results):
-    (table,) = (t for t in sensitivity.tables(plan, results) if t.name == "sigma_energy")
-    less = rows_of(table, figure=sensitivity.SIGMA_DIFFERENCE, noise=2.0)
-    assert [row.keys["measure"] for row in less] == ["energy of F_a", "energy of F_x (Zhang)"]
-    by = {row.keys["measure"]: row.ours for row in rows_of(table, figure="accuracy [%]", noise=2.0)}
-    for row in less:
-        assert row.ours == pytest.approx(by[row.keys["measure"]] - by["sigma of F_a"])

@@ -8,7 +8,7 @@ from holdfast.contact import ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.report.result_tables import pivot
-from holdfast_lab.report.table_layouts import to_html
+from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison import jobs, real_recordings
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
@@ -83,7 +83,7 @@ METHODS_OF_TABLES = [
 
 def test_the_tables(made):
     assert list(made) == ["real", "real_recordings", "real_fingers", "real_pairs"]
-    assert all(to_html(table) for table in made.values())
+    assert all(to_markdown(table) for table in made.values())
     assert lines(made["real"]) == METHODS_OF_TABLES
     names = [f"pick-{k}" for k in range(4)]
     assert lines(made["real_recordings"]) == [(n, *m) for n in names for m in METHODS_OF_TABLES]
@@ -153,8 +153,4 @@ def test_the_caveat_of_the_box_is_given_for_the_box_only(corpus, made, monkeypat
 
 def test_without_real_recordings_there_is_nothing_to_do(corpus):
     plan = StudyPlan({"main": corpus})
-    assert (
-        real_recordings.tasks(plan),
-        real_recordings.tables(plan, {}),
-        real_recordings.figures(plan, {}),
-    ) == ([], [], [])
+    assert (real_recordings.tasks(plan), real_recordings.tables(plan, {})) == ([], [])

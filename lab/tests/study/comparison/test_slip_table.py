@@ -39,7 +39,8 @@ INTERVALS = SlipIntervals(ENDS, ENDS, ENDS, (60.0, 62.0), None, (0.1, 1.0), {
 
 
 def evaluation(split="object", intervals=INTERVALS):
-    return SlipEvaluation(split, 6, SlipSummary({}, METRICS, intervals, threshold_chosen=True))
+    summary = SlipSummary({}, METRICS, intervals, threshold_chosen=True)
+    return SlipEvaluation(split, 6, summary, summary)
 
 
 def corpus(name, fingers=("thumb", "index")):

@@ -10,14 +10,11 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 from holdfast_lab.study.methods.learning import (
-    N_LEARNING_STEPS,
     hand_motion,
-    last_second,
     motion_features,
     shear_statistics,
     taxel_motion,
 )
-from training.build import tiny_module, tiny_recording
 
 from .patch_signals import pressed
 
@@ -155,52 +152,3 @@ def test_four_methods_of_james_and_lepora():
         assert method.whole_hand == ("global" in name)
         assert method.recipe.name in name
     assert len({METHODS[name].title for name in names}) == 4
-
-
-def second_windows(recording):
-    hand = hand_signal(recording, Tare.parse("none"))
-    name = next(iter(hand.fingers))
-    rows = last_second(hand)[name]
-    return rows.reshape(len(rows), N_LEARNING_STEPS, 3), hand.fingers[name].force
-
-
-def test_at_100_hz_a_window_is_the_last_100_samples():
-    rows, force = second_windows(tiny_recording(0))
-    assert rows.dtype == np.float32
-    assert np.isnan(rows[:99]).all()
-    for k in (99, 100, 250, 399):
-        assert rows[k] == pytest.approx(force[k - 99 : k + 1], rel=1e-6, abs=1e-3)
-
-
-def test_the_window_is_one_second_at_any_rate():
-    """A force that grows by 2 a second is interpolated between samples: 0.02 a step."""
-    module = tiny_module(0, n=400, rate=150.0)
-    ramp = np.zeros_like(module.readings)
-    ramp[:, 0, 2] = 2.0 * module.times
-    given = type(module)(module.sensor, module.times, ramp, labels=module.labels)
-    rows, _ = second_windows(Recording("ramp", {"index": given}))
-    assert rows.shape == (400, 100, 3)
-    first = int(np.flatnonzero(np.isfinite(rows).all(axis=(1, 2)))[0])
-    assert module.times[first] == pytest.approx(0.99, abs=1 / 150)
-    for k in (first + 1, 399):
-        steps = 2.0 * (module.times[k] - 0.01 * np.arange(99, -1, -1))
-        assert rows[k, :, 2] == pytest.approx(steps, abs=1e-5)
-        assert (rows[k, :, :2] == 0).all()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("rate", [80.0, 100.0, 150.0])
-def test_the_last_second_is_causal(rate):
-    module = tiny_module(1, rate=rate)
-    whole, _ = second_windows(Recording("whole", {"index": module}))
-    for end in (10, 160, 301):
-        part, _ = second_windows(Recording("part", {"index": module.slice(0, end)}))
-        assert part == pytest.approx(whole[:end], rel=1e-6, nan_ok=True)
-
-
-def test_description_of_the_network():
-    method = METHODS["tcn"]
-    assert (method.name, method.category, method.recipe.name) == ("tcn", "learning", "tcn")
-    assert dict(method.reference) == {
-        "n_epochs": 200, "patience": 15, "learning_rate": 2e-3, "dropout": 0.2,
-    }  # fmt: skip

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.methods import METHODS, PAPER_FAMILY, hand_signal
-from holdfast_lab.study.methods.wavelets import CUTS, detail_energy, detail_sigma, normal_energy
+from holdfast_lab.study.methods.wavelets import detail_energy, normal_energy
 from training.build import tiny_recording
 
 from .patch_signals import along_normal, pressed
@@ -51,38 +50,6 @@ def test_energy_is_spread_and_mean_of_the_details():
 def test_an_odd_window_is_refused():
     with pytest.raises(ValueError, match="an even window of at least 2 samples expected, 5 given"):
         detail_energy(np.ones(9), window=5)
-
-
-def test_sigma_is_that_of_the_paper():
-    force = np.random.default_rng(0).normal(size=(60, 3))
-    sigma = haar_features(force, 14)[:, FEATURE_NAMES.index("sigma")]
-    assert detail_sigma(np.linalg.norm(force, axis=1)) == pytest.approx(sigma, nan_ok=True)
-
-
-def test_sigma_and_energy_differ_by_the_mean_of_the_details():
-    """A steady slope has energy and no sigma; else E = N_w sigma^2 + n (mean d)^2."""
-    slope = 3.0 * np.arange(20)
-    assert detail_sigma(slope)[13:] == pytest.approx(np.zeros(7))
-    assert detail_energy(slope)[13:] == pytest.approx(np.full(7, 7 * 9 / 2))
-    values = np.random.default_rng(1).normal(size=14)
-    details = (values[0::2] - values[1::2]) / np.sqrt(2)
-    expected = 14 * detail_sigma(values)[-1] ** 2 + 7 * details.mean() ** 2
-    assert detail_energy(values)[-1] == pytest.approx(expected)
-
-
-def test_each_cut_has_one_feature_of_every_finger():
-    hand = hand_signal(synthetic_recording("one", 0, ("thumb", "index")), Tare.parse("0.5"))
-    thumb = hand.fingers["thumb"]
-    for name, signal, measure in (
-        ("sigma_cut", thumb.amplitude, detail_sigma),
-        ("energy_cut", thumb.amplitude, detail_energy),
-        ("energy_x_cut", thumb.normal_force, detail_energy),
-    ):
-        features = CUTS[name].features(hand)
-        assert set(features) == {"thumb", "index"}
-        assert features["thumb"].shape == (len(thumb.times), 1)
-        last = features["thumb"][-200:, 0]
-        assert last == pytest.approx(np.log10(measure(signal)[-200:]))
 
 
 def test_trees_have_the_six_features_of_the_paper():

@@ -7,8 +7,8 @@ import pytest
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.metrics import FingerDecisions
 from holdfast.recordings import Truth
-from holdfast_lab.study.paper import verdicts
-from holdfast_lab.study.paper.verdicts import find_disturbances, stable_after_lock
+from holdfast_lab.study.paper import experiment_tables
+from holdfast_lab.study.paper.experiment_tables import find_disturbances, stable_after_lock
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import recording_with_truth, save_all, truth_of
 
@@ -76,7 +76,7 @@ class TestDisturbances:
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("verdicts")
+    folder = tmp_path_factory.mktemp("experiments")
     corpora = {}
     for role, seeds, case in (("main", range(4), "2"), ("vigorous", range(8, 10), "failed")):
         made = []
@@ -88,15 +88,15 @@ def plan(tmp_path_factory):
 
 
 def test_the_tables(plan):
-    results = {task.name: task.function(*task.arguments) for task in verdicts.tasks(plan)}
-    one, two, phases, single = verdicts.tables(plan, results)
+    results = {task.name: task.function(*task.arguments) for task in experiment_tables.tasks(plan)}
+    one, two, phases, single = experiment_tables.tables(plan, results)
     called = {(r.keys["experiment"], r.keys["phase"]): r.ours for r in phases.rows}
     assert called["1: failed", "disturbed"] and called["2: held", "disturbed"]
     failed = {(r.keys["on"], r.keys["figure"]): r.ours for r in one.rows}
     assert failed["vigorous profile", "failed grasps"] == 2
     assert {on for on, _ in failed} == {"vigorous profile"}
     counts = np.sum(
-        [each.unstable for each in results["verdicts/logreg"] if each.case == "failed"], axis=0
+        [each.unstable for each in results["experiments/logreg"] if each.case == "failed"], axis=0
     )
     logreg = next(
         r for r in one.rows

@@ -1,5 +1,15 @@
-"""Speed of the features and of the detector, beside other libraries and copying memory."""
+"""Speed of the features and of the detector, beside other libraries and copying memory.
 
+    python benchmarks/speed.py                          # half a minute
+    python benchmarks/speed.py --samples 1000000 --json
+
+Everything is measured in one run and given as ratios. The batch features are compared with a copy
+of the same number of bytes, with PyWavelets, SciPy and tsflex; the update of a hand with PyWavelets
+and scikit-learn. Libraries that are not installed are left out.
+"""
+
+import argparse
+import json
 import os
 import platform
 import time
@@ -31,7 +41,7 @@ Task = Callable[[], object]
 
 
 def benchmark(n_samples: int = 10_000_000, n_updates: int = 20_000) -> dict[str, Any]:
-    """Measure everything that `holdfast bench` reports.
+    """Measure everything that this program prints.
 
     Args:
         n_samples: samples of one finger for the batch features.
@@ -228,7 +238,7 @@ def _peer_updates(samples: list[dict[str, Any]]) -> float:
     return total
 
 
-def _create_pipeline() -> Any:  # noqa: ANN401 (scikit-learn has no types)
+def _create_pipeline() -> Any:
     from sklearn.linear_model import LogisticRegression
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -243,3 +253,42 @@ def _version(package: str) -> str | None:
         return version(package)
     except PackageNotFoundError:
         return None
+
+
+def print_report(report: dict[str, Any]) -> None:
+    """Print the figures as text."""
+    batch = report["batch"]
+    print(f"batch features of {batch['n_samples']:,} samples, window {batch['window']}")
+    print(f"  {1e9 * batch['seconds_per_sample']:.1f} ns a sample")
+    print(f"  {batch['ratio_to_copy']:.2f} times as long as copying the same bytes")
+    for peer in ("pywt", "scipy", "tsflex"):
+        print_speedup(peer, batch[f"speedup_over_{peer}"])
+    update = report["hand_update"]
+    print(f"\nupdate of a hand, {update['n_fingers']} fingers of {update['n_taxels']} taxels")
+    print("  " + ", ".join(f"{p} {1e6 * update[p]:.1f} us" for p in ("p50", "p99", "p999")))
+    print_speedup("pywt + scikit-learn", update["speedup_over_pywt_sklearn"])
+
+
+def print_speedup(peer: str, ratio: float | None) -> None:
+    """Print how many times faster than a library the kernel is; None if it is not installed."""
+    print(f"  {ratio:,.0f} times faster than {peer}" if ratio else f"  {peer}: not installed")
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--samples", type=int, default=10_000_000, help="of the batch features")
+    parser.add_argument("--updates", type=int, default=20_000, help="of a hand")
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
+    if options.samples < 1000 or options.updates < 1000:
+        parser.error("at least 1000 samples and updates expected")
+    report = benchmark(options.samples, options.updates)
+    if options.json:
+        print(json.dumps(report))
+    else:
+        print_report(report)
+
+
+if __name__ == "__main__":
+    main()

@@ -23,24 +23,22 @@ from holdfast.metrics.events import MIN_STABLE_DURATION
 from holdfast.metrics.masks import join_runs, runs
 from holdfast.recordings import Truth
 from holdfast.sensors.types import Array
-from holdfast_lab.report.html_report import ReportFigure
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import short_title
 from holdfast_lab.study.comparison.rows import count_row, quantile_row, ratio_row
-from holdfast_lab.study.evaluation.error_breakdown import latest_rows
 from holdfast_lab.study.evaluation.evaluate_method import (
     EvaluationEffort,
     EvaluationJob,
     score_splits,
 )
 from holdfast_lab.study.evaluation.fitted_method import ScoredRecording
+from holdfast_lab.study.evaluation.held_object import latest_rows
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.paper.label_sources import has_truth
 from holdfast_lab.study.plan import Corpus, StudyPlan
 from holdfast_lab.tasks import Task
 
-VERDICT_METHODS = ("logreg", "svm", "holdfast", "noise_floor", "always_stable")
-QUICK_VERDICT_METHODS = ("logreg", "holdfast")
+EXPERIMENT_METHODS = ("logreg", "svm", "holdfast", "noise_floor", "always_stable")
+QUICK_EXPERIMENT_METHODS = ("logreg", "holdfast")
 ROLE_TITLES = {
     "main": "by recording",
     "fresh": "other seeds",
@@ -51,7 +49,12 @@ ROLE_TITLES = {
 """Roles whose recordings are evaluated, and their titles. "main" is evaluated out of fold."""
 ONLY_FAILED = ("gentle", "vigorous")
 """Roles of which only the failed grasps are evaluated."""
-VERDICT_DIGITS = {"delay median [s]": 3, "delay 95 % [s]": 3, "disturbances": 0, "failed grasps": 0}
+EXPERIMENT_DIGITS = {
+    "delay median [s]": 3,
+    "delay 95 % [s]": 3,
+    "disturbances": 0,
+    "failed grasps": 0,
+}
 
 GRASP_PHASES = (Phase.CLOSING, *HELD_PHASES)
 """Phases of a grasp, until the release begins."""
@@ -77,7 +80,7 @@ class DisturbanceOutcome(msgspec.Struct, frozen=True):
     delay: float
 
 
-class GraspVerdict(msgspec.Struct, frozen=True):
+class GraspOutcome(msgspec.Struct, frozen=True):
     """Decisions of one method on one grasp.
 
     Attributes:
@@ -109,16 +112,16 @@ class GraspVerdict(msgspec.Struct, frozen=True):
 
 def tasks(plan: StudyPlan) -> list[Task]:
     """Return a task for each method; none without a truth."""
-    if not has_truth(plan.main.load()[0]):
+    if not plan.main.has_truth:
         return []
     corpora = {role: plan.corpora[role] for role in ROLE_TITLES if role in plan.corpora}
     folds, max_samples = (3, 10_000) if plan.quick else (5, 20_000)
     return [
         Task(
-            f"verdicts/{name}",
-            grasp_verdicts,
+            f"experiments/{name}",
+            grasp_outcomes,
             (name, corpora, folds, max_samples, plan.seed),
-            list[GraspVerdict],
+            list[GraspOutcome],
             cost=40.0,
         )
         for name in _methods(plan)
@@ -127,22 +130,18 @@ def tasks(plan: StudyPlan) -> list[Task]:
 
 def tables(plan: StudyPlan, results: Mapping[str, Any]) -> list[ResultTable]:
     """Return the tables of experiment 1, experiment 2, phases and single disturbances."""
-    by_method = {n: results[f"verdicts/{n}"] for n in _methods(plan) if f"verdicts/{n}" in results}
+    by_method = {
+        n: results[f"experiments/{n}"] for n in _methods(plan) if f"experiments/{n}" in results
+    }
     makers = (failed_table, disturbed_table, phase_table, single_table)
     made = [make(by_method, plan.seed) for make in makers] if by_method else []
     return [table for table in made if table.rows]
 
 
-def figures(plan: StudyPlan, results: Mapping[str, Any]) -> list[ReportFigure]:
-    """Return no figures; those of the experiments show single recordings."""
-    del plan, results
-    return []
-
-
-def grasp_verdicts(
+def grasp_outcomes(
     name: str, corpora: Mapping[str, Corpus], n_folds: int, max_samples: int, seed: int
-) -> list[GraspVerdict]:
-    """Return the verdicts of a method on all recordings, none of them used for its own fit.
+) -> list[GraspOutcome]:
+    """Return the outcomes of a method on all recordings, none of them used for its own fit.
 
     Args:
         name: of the method, one for fingers.
@@ -171,14 +170,14 @@ def grasp_verdicts(
     tests = tuple(others.values())
     job = EvaluationJob(name, corpora["main"], ("recording",), tests, effort=effort, seed=seed)
     return [
-        verdict_of(role, cases[role][scored.recording.name], scored)
+        outcome_of(role, cases[role][scored.recording.name], scored)
         for role, (_, recordings) in zip(("main", *others), score_splits(job), strict=True)
         for scored in recordings
     ]
 
 
-def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
-    """Return the verdict of a method on one scored grasp."""
+def outcome_of(role: str, case: str, scored: ScoredRecording) -> GraspOutcome:
+    """Return the outcome of a method on one scored grasp."""
     recording, truth = scored.recording, scored.recording.truth
     decisions = scored.decide(recording.exact_labels)
     # Samples of a grasp, from the start of the closing until the release begins: all of them and
@@ -207,7 +206,7 @@ def verdict_of(role: str, case: str, scored: ScoredRecording) -> GraspVerdict:
         for finger in decisions.fingers.values()
     ]
     known = [time for time in stable_after if time is not None]
-    return GraspVerdict(
+    return GraspOutcome(
         role=role,
         recording=recording.name,
         object=recording.object or "",
@@ -290,11 +289,11 @@ def find_disturbances(
     return disturbances
 
 
-def failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def failed_table(by_method: Mapping[str, Sequence[GraspOutcome]], seed: int) -> ResultTable:
     """Return the table of experiment 1."""
     rows: list[Row] = []
-    for name, verdicts in by_method.items():
-        failed = [verdict for verdict in verdicts if verdict.case == "failed"]
+    for name, outcomes in by_method.items():
+        failed = [outcome for outcome in outcomes if outcome.case == "failed"]
         for title, chosen in _groups(failed):
             keys: Keys = {"on": title, "method": METHODS[name].title}
             rows.append(count_row(keys | {"figure": "failed grasps"}, [1] * len(chosen)))
@@ -317,11 +316,11 @@ def failed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> 
     )
 
 
-def disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def disturbed_table(by_method: Mapping[str, Sequence[GraspOutcome]], seed: int) -> ResultTable:
     """Return the table of experiment 2."""
     rows: list[Row] = []
-    for name, verdicts in by_method.items():
-        whole = [verdict for verdict in verdicts if verdict.role not in ONLY_FAILED]
+    for name, outcomes in by_method.items():
+        whole = [outcome for outcome in outcomes if outcome.role not in ONLY_FAILED]
         for title, chosen in _groups([grasp for grasp in whole if grasp.case != "failed"]):
             rows += disturbed_rows({"on": title, "method": METHODS[name].title}, chosen, seed)
     note = (
@@ -335,7 +334,7 @@ def disturbed_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) 
     )
     title = "Experiment 2: locked, disturbed, released"
     lines = ("on", "method")
-    digits = VERDICT_DIGITS | dict.fromkeys(_LOCK_FIGURES, 3)
+    digits = EXPERIMENT_DIGITS | dict.fromkeys(_LOCK_FIGURES, 3)
     return ResultTable("experiment_2", title, note, rows, lines, digits_of=digits)
 
 
@@ -346,7 +345,7 @@ _LOCK_FIGURES = (
 )
 
 
-def disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Iterator[Row]:
+def disturbed_rows(keys: Keys, chosen: Sequence[GraspOutcome], seed: int) -> Iterator[Row]:
     """Yield the rows of one line of the table of experiment 2."""
     first = [grasp.first_stable for grasp in chosen]
     lasting = [grasp.lasting_stable for grasp in chosen]
@@ -365,12 +364,12 @@ def disturbed_rows(keys: Keys, chosen: Sequence[GraspVerdict], seed: int) -> Ite
     yield quantile_row(keys | {"figure": "delay 95 % [s]"}, delays, 0.95, seed)
 
 
-def phase_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def phase_table(by_method: Mapping[str, Sequence[GraspOutcome]], seed: int) -> ResultTable:
     """Return the table of what is called unstable in each phase of the experiments."""
     rows = []
-    for name, verdicts in by_method.items():
+    for name, outcomes in by_method.items():
         for title, is_failed in (("1: failed", True), ("2: held", False)):
-            chosen = [v for v in verdicts if (v.case == "failed") == is_failed and v.case != "1"]
+            chosen = [v for v in outcomes if (v.case == "failed") == is_failed and v.case != "1"]
             for phase in map(str, GRASP_PHASES) if chosen else ():
                 n, called = np.array([grasp.phases[phase] for grasp in chosen]).T
                 keys: Keys = {"experiment": title, "method": METHODS[name].title, "phase": phase}
@@ -385,19 +384,19 @@ def phase_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> R
     return ResultTable("experiment_phases", title, note, rows, lines, column="phase")
 
 
-def single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> ResultTable:
+def single_table(by_method: Mapping[str, Sequence[GraspOutcome]], seed: int) -> ResultTable:
     """Return the table of single disturbances."""
     del seed
     rows: list[Row] = []
     digits: dict[str, int] = {}
-    for name, verdicts in by_method.items():
+    for name, outcomes in by_method.items():
         short = short_title(METHODS[name].title)
         detected, delay = f"{short}: detected", f"{short}: delay [s]"
         digits |= {detected: 0, delay: 3}
         # The first recording with disturbances of each object; fresh ones, if there are.
-        disturbed = [one for one in verdicts if one.disturbances and one.case != "failed"]
+        disturbed = [one for one in outcomes if one.disturbances and one.case != "failed"]
         role = "fresh" if any(one.role == "fresh" for one in disturbed) else "main"
-        first: dict[str, GraspVerdict] = {}
+        first: dict[str, GraspOutcome] = {}
         for grasp in sorted(disturbed, key=lambda grasp: grasp.recording):
             if grasp.role == role:
                 first.setdefault(grasp.object, grasp)
@@ -421,15 +420,15 @@ def single_table(by_method: Mapping[str, Sequence[GraspVerdict]], seed: int) -> 
     return ResultTable("disturbances", title, note, rows, lines, digits_of=digits)
 
 
-def _groups(verdicts: Sequence[GraspVerdict]) -> Iterator[tuple[str, list[GraspVerdict]]]:
-    """Yield the verdicts of each role, and of all roles if there are several."""
-    roles = [role for role in ROLE_TITLES if any(verdict.role == role for verdict in verdicts)]
+def _groups(outcomes: Sequence[GraspOutcome]) -> Iterator[tuple[str, list[GraspOutcome]]]:
+    """Yield the outcomes of each role, and of all roles if there are several."""
+    roles = [role for role in ROLE_TITLES if any(outcome.role == role for outcome in outcomes)]
     for role in roles:
-        yield ROLE_TITLES[role], [verdict for verdict in verdicts if verdict.role == role]
+        yield ROLE_TITLES[role], [outcome for outcome in outcomes if outcome.role == role]
     if len(roles) > 1:
-        yield "all", list(verdicts)
+        yield "all", list(outcomes)
 
 
 def _methods(plan: StudyPlan) -> list[str]:
-    names = QUICK_VERDICT_METHODS if plan.quick else VERDICT_METHODS
+    names = QUICK_EXPERIMENT_METHODS if plan.quick else EXPERIMENT_METHODS
     return [name for name in names if name in METHODS]

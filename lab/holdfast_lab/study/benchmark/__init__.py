@@ -1,1 +1,0 @@
-"""The frozen benchmark: its data, submissions of other programs, and their scores."""
