@@ -51,7 +51,7 @@ def test_a_code_becomes_its_word(kind, first):
     assert [kind(code) for code in codes] == list(kind)
     assert [kind(np.int8(code)) for code in codes] == list(kind)
     for wrong in (first - 1, codes.stop, 1.5, "other"):
-        with pytest.raises(ValueError, match=rf"{wrong!r} is not a valid {kind.__name__}"):
+        with pytest.raises(ValueError, match=f"{wrong!r}"):
             kind(wrong)
 
 
@@ -257,5 +257,5 @@ def test_each_name_has_its_own_states():
 
 @pytest.mark.parametrize("duration", [-0.1, math.nan, math.inf])
 def test_a_wrong_duration(duration):
-    with pytest.raises(ValueError, match=f"at least 0 s expected, {duration} given"):
+    with pytest.raises(ValueError, match=f"{duration} given"):
         StateChanges(["thumb"], duration)

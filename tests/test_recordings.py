@@ -40,30 +40,23 @@ def recording(**fields):
 class TestLabel:
     @pytest.mark.parametrize("span", [(1, 1), (2, 1), (0, float("nan")), (0, float("inf"))])
     def test_ends_after_its_start(self, span):
-        with pytest.raises(ValueError) as refused:
+        with pytest.raises(ValueError, match="ends after its start"):
             Label(*span, ContactState.STABLE)
-        assert str(refused.value) == (
-            f"a label ends after its start; [{span[0]}, {span[1]}) s given"
-        )
 
     @pytest.mark.parametrize("state", [ContactState.UNKNOWN, "UNKNOWN"])
     def test_unknown_is_no_label(self, state):
-        with pytest.raises(
-            ValueError, match=r"^a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN given$"
-        ):
+        with pytest.raises(ValueError, match="UNKNOWN"):
             Label(0, 1, state)
 
     def test_refuses_unknown_states_and_causes(self):
-        with pytest.raises(ValueError, match="'wobbly' is not a valid ContactState"):
+        with pytest.raises(ValueError, match="'wobbly'"):
             Label(0, 1, "wobbly")
-        with pytest.raises(ValueError, match="'wind' is not a valid Cause"):
+        with pytest.raises(ValueError, match="'wind'"):
             Label(0, 1, ContactState.UNSTABLE, "wind")
 
     @pytest.mark.parametrize("confidence", [-0.1, 1.1, float("nan")])
     def test_confidence(self, confidence):
-        with pytest.raises(
-            ValueError, match=f"^confidence from 0 to 1 expected, {confidence} given$"
-        ):
+        with pytest.raises(ValueError, match="confidence"):
             Label(0, 1, ContactState.STABLE, confidence=confidence)
 
     def test_plain_words_become_members(self):
@@ -108,16 +101,12 @@ class TestTactile:
         ],
     )
     def test_refuses(self, fields, message):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match=message):
             tactile(**fields)
-        assert str(refused.value) == message
 
     def test_labels_within_the_recording(self):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="outside"):
             tactile(labels=(Label(0, 1, ContactState.STABLE),))
-        assert str(refused.value) == (
-            "label [0, 1) s lies outside the recording, which runs from 0 to 0.105 s"
-        )
 
     def test_labels_before_the_recording(self):
         with pytest.raises(RecordingError, match="outside the recording"):
@@ -125,12 +114,11 @@ class TestTactile:
 
     def test_labels_do_not_overlap(self):
         labels = (Label(0, 0.05, ContactState.STABLE), Label(0.04, 0.06, ContactState.UNSTABLE))
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="overlap"):
             tactile(labels=labels)
-        assert str(refused.value) == "labels overlap: [0, 0.05) s and [0.04, 0.06) s"
 
     def test_labels_need_samples(self):
-        with pytest.raises(RecordingError, match=r"^1 labels given for a module without samples$"):
+        with pytest.raises(RecordingError, match="without samples"):
             tactile(n=0, labels=(Label(0, 1, ContactState.STABLE),))
 
     def test_labels_are_put_in_order(self):
@@ -224,16 +212,15 @@ class TestLabelsFromSamples:
         )
 
     def test_as_many_states_as_times(self):
-        with pytest.raises(ValueError, match=r"^1 states given for 2 times$"):
+        with pytest.raises(ValueError, match="1 states"):
             labels_from_samples(np.arange(2.0), [None], period=1)
 
 
 class TestRecording:
     @pytest.mark.parametrize("modules", [{}, {"finger1": tactile(n=0)}])
     def test_needs_a_sample(self, modules):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="'one' has no samples"):
             Recording("one", modules)
-        assert str(refused.value) == "recording 'one' has no samples; at least one expected"
 
     def test_start_end_and_duration_are_over_all_modules(self):
         late = tactile(times=0.05 + np.arange(10) / 100)
@@ -248,9 +235,8 @@ class TestRecording:
             recording().metadata["object"] = "can"
 
     def test_labels_for_a_missing_module(self):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="thumb"):
             recording().with_labels({"thumb": ()})
-        assert str(refused.value) == "labels for thumb given; recording 'one' has finger1"
 
     def test_with_labels_replaces_all(self):
         label = Label(0, 0.05, ContactState.STABLE)
@@ -308,7 +294,7 @@ class TestTruth:
         "fields", [{"hand": {"phase": np.ones(2)}}, {"fingers": {"thumb": {"phase": np.ones(2)}}}]
     )
     def test_as_many_rows_as_times(self, fields):
-        with pytest.raises(RecordingError, match=r"^truth 'phase' has 2 rows for 3 times$"):
+        with pytest.raises(RecordingError, match="'phase'"):
             Truth(np.arange(3.0), **fields)
 
     def test_a_slice_has_the_rows_of_its_samples(self):
@@ -349,11 +335,8 @@ def test_two_equal_modules():
     whole = synthetic_recording("a", 0, ("thumb", "index"))
     whole.check_modules_differ()
     thumb = whole.modules["thumb"]
-    with pytest.raises(RecordingError) as error:
+    with pytest.raises(RecordingError, match="thumb and index"):
         replace(whole, modules=dict.fromkeys(("thumb", "index"), thumb)).check_modules_differ()
-    assert str(error.value) == (
-        "recording 'a': thumb and index have the same readings; those of different sensors expected"
-    )
     still = replace(thumb, readings=np.zeros_like(thumb.readings))
     replace(whole, modules=dict.fromkeys(("thumb", "index"), still)).check_modules_differ()
 

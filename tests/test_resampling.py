@@ -230,12 +230,10 @@ def test_live_readings_are_copies():
 def test_live_refuses_times_that_do_not_go_forward(time, after):
     resampler = Resampler(100.0, 150.0)
     resampler.push(0.5, np.ones((1, 3)))
-    with pytest.raises(StreamError) as raised:
+    with pytest.raises(StreamError, match="time"):
         resampler.push(time, np.ones((1, 3)))
-    assert str(raised.value) == (f"time {time} s given{after}; finite, increasing times expected")
-    with pytest.raises(StreamError) as raised:
+    with pytest.raises(StreamError, match="time nan"):
         Resampler(100.0, 150.0).push(np.nan, np.ones((1, 3)))
-    assert str(raised.value) == "time nan s given; finite, increasing times expected"
 
 
 @pytest.mark.parametrize("rates", [(0.0, 100.0), (np.nan, 100.0), (100.0, -1.0)])
@@ -248,9 +246,8 @@ def test_live_refuses_rates(rates):
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
 def test_refuses_rates(rate):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="rate"):
         resample(made([1.0], [0.0]), rate)
-    assert str(raised.value) == f"a rate above 0 Hz expected, {rate} given"
 
 
 def changes(n_rows, ratio, start=0.0):

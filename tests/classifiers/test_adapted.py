@@ -173,18 +173,13 @@ def test_few_samples_help_a_prior_that_is_nearly_right():
 def test_one_class_is_refused(stable):
     given = GIVEN._replace(positive=np.full(600, stable))
     n = 600 if stable else 0
-    with pytest.raises(TrainingError) as raised:
+    with pytest.raises(TrainingError, match="labelled"):
         adapted(1.0, given)
-    assert str(raised.value) == (
-        f"{n} samples labelled stable and {600 - n} labelled not stable given; both classes are "
-        "needed to train"
-    )
 
 
 def test_another_number_of_features_is_refused():
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="3 expected"):
         adapted(1.0, GIVEN._replace(features=GIVEN.features[:, :2]))
-    assert str(raised.value) == "2 features given, 3 expected to adapt"
 
 
 def test_every_prior_has_a_name_of_its_own():
@@ -196,9 +191,8 @@ def test_every_prior_has_a_name_of_its_own():
 
 
 def test_an_unknown_change_is_refused():
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="'all'"):
         adapted(1.0, change="all")
-    assert str(raised.value) == "unknown change 'all'; there are none, calibration, weights"
 
 
 def test_the_search_covers_the_reference():

@@ -32,9 +32,8 @@ def name(request):
 
 def test_names(name):
     assert recipe(name).name == name
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="'forest'"):
         recipe("forest")
-    assert str(raised.value) == "unknown classifier 'forest'; there are logreg, svm"
 
 
 def test_the_reference_setting(name):
@@ -44,12 +43,8 @@ def test_the_reference_setting(name):
 @pytest.mark.parametrize("n_stable", [0, 9])
 def test_one_class_is_refused(name, n_stable):
     given = Samples(np.ones((9, 3)), np.full(9, n_stable > 0), np.zeros(9, dtype=int))
-    with pytest.raises(TrainingError) as raised:
+    with pytest.raises(TrainingError, match="labelled"):
         recipe(name).fit(given, recipe(name).reference, 0)
-    assert str(raised.value) == (
-        f"{n_stable} samples labelled stable and {9 - n_stable} labelled not stable given; "
-        "both classes are needed to train"
-    )
 
 
 def test_it_learns(name):

@@ -382,47 +382,32 @@ class TestIntervalTare:
         assert np.array_equal(found.fingers["index"].force, expected)
 
     def test_is_refused_live(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"0.5:0.9"):
             Detector(model(tare="0.5:0.9"))
-        assert str(raised.value) == (
-            "the model's tare is the interval 0.5:0.9 s of a recording; "
-            "seconds, 'first' or 'none' expected where samples come one by one"
-        )
 
     def test_without_samples_is_refused(self):
-        with pytest.raises(ValueError) as raised:
+        with pytest.raises(ValueError, match=r"index of 'made'.* 7:9"):
             detect(model(tare="7:9"), recording(index=tactile(seed=2)))
-        assert str(raised.value) == (
-            "index of 'made', which runs from 0 to 1.99 s: tare 7:9: no finite sample in that time"
-        )
 
 
 class TestRefusals:
     def test_none_of_the_fingers(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="ring"):
             detect(model(), recording(ring=tactile()))
-        assert str(raised.value) == "the model is for thumb, index; ring given"
 
     def test_run_with_none_of_the_fingers(self):
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match="ring"):
             Detector(model()).run(recording(ring=tactile()))
-        assert str(raised.value) == (
-            "recording 'made' has samples of ring; the model is for thumb, index"
-        )
 
     def test_run_with_other_taxels(self):
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match=r"index: .*\(1, 3\)"):
             Detector(model()).run(recording(index=tactile(which=sensor(1, "small"))))
-        assert str(raised.value) == "index: a sample of shape (1, 3) given, (2, 3) expected (tiny)"
 
     def test_run_that_goes_back(self):
         detector = Detector(model())
         detector.run(recording(index=tactile(20, start=1.0)))
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match=r"1.1 s"):
             detector.run(recording(index=tactile(20, start=1.1)))
-        assert str(raised.value) == (
-            "time 1.1 s given after 1.19 s; finite, increasing times expected"
-        )
 
 
 def test_unstable_beside_a_high_probability_says_why():

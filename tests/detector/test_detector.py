@@ -327,9 +327,8 @@ def test_a_refused_update_changes_nothing(samples, time, message):
     one, two = Detector(model()), Detector(model())
     for k in range(100):
         if k == 50:
-            with pytest.raises(StreamError) as raised:
+            with pytest.raises(StreamError, match=message):
                 two.update(samples, time)
-            assert str(raised.value) == message
         given = {"index": values[k]} if k == 50 else {"thumb": values[k], "index": values[k]}
         assert repr(one.update(given, k / RATE)) == repr(two.update(given, k / RATE))
     assert one.events() == two.events()
@@ -337,9 +336,8 @@ def test_a_refused_update_changes_nothing(samples, time, message):
 
 @pytest.mark.parametrize("time", [np.nan, np.inf, -np.inf])
 def test_refuses_a_first_time_that_is_not_finite(time):
-    with pytest.raises(StreamError) as raised:
+    with pytest.raises(StreamError, match="time"):
         Detector(model()).update({}, time)
-    assert str(raised.value) == f"time {time} s given; finite, increasing times expected"
 
 
 @pytest.mark.parametrize("time", [1, np.float32(1), np.int64(1)])
@@ -410,12 +408,8 @@ def test_memory_does_not_grow():
 
 class TestConstruction:
     def test_a_model_for_any_finger_needs_the_fingers(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="fingers"):
             Detector(Model.load("builtin:noise-floor"))
-        assert str(raised.value) == (
-            "the model builtin:noise-floor is for any finger: the fingers of the hand and "
-            "their sensors expected"
-        )
 
 
 class TestNoiseFloor:
@@ -503,13 +497,12 @@ class TestThresholds:
 
     @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan")])
     def test_thresholds_outside_of_0_to_1_are_refused(self, value):
-        with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, "):
+        with pytest.raises(ValueError, match="threshold"):
             Detector(model()).set_thresholds({"thumb": value, "index": value})
 
     def test_an_unknown_finger_is_refused(self):
-        with pytest.raises(ValueError) as raised:
+        with pytest.raises(ValueError, match="ring"):
             Detector(model()).set_thresholds({"thumb": 0.5, "ring": 0.5})
-        assert str(raised.value) == "threshold of ring given; the detector has thumb, index"
 
 
 def test_samples_that_python_converts_give_the_same_estimates():
@@ -526,5 +519,5 @@ def test_samples_that_python_converts_give_the_same_estimates():
 )  # fmt: skip
 def test_what_is_no_number_is_an_error_of_the_stream(sample):
     detector = Detector(Model.load("builtin:noise-floor"), {"index": built_in("uskin-4x4")})
-    with pytest.raises(StreamError, match=r"^index: \(16, 3\) numbers expected; "):
+    with pytest.raises(StreamError, match="index"):
         detector.update({"index": sample}, 0.0)

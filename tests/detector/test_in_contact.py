@@ -106,13 +106,13 @@ def test_a_declared_baseline_gives_the_force():
 @pytest.mark.parametrize("values", [[[1, 2, 3]], "x", [[[np.nan] * 3] * 16]])
 def test_a_wrong_baseline_is_refused(values):
     recording = held(np.ones(10), starts_loaded=True, baselines={"a": values})
-    with pytest.raises(ValueError, match="baselines of a: 16 taxels of 3 finite numbers expected"):
+    with pytest.raises(ValueError, match="baselines of a"):
         detect(Model.load("builtin:any"), recording)
 
 
 def test_baselines_of_another_type_are_refused():
     recording = held(np.ones(10), starts_loaded=True, baselines=[1, 2])
-    with pytest.raises(ValueError, match="baselines by finger expected, list given"):
+    with pytest.raises(ValueError, match="baselines"):
         detect(Model.load("builtin:any"), recording)
 
 

@@ -42,50 +42,40 @@ def test_host_and_path(text, host, path):
 
 @pytest.mark.parametrize("text", ["grasp.csv:", "udp://host", "http://host/a", "can", "", ":"])
 def test_unknown_schemes(text):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=re.escape(repr(text))):
         parse(text)
-    assert str(error.value) == (
-        f"{text!r} is neither the path of a recording nor the URI of a source; {KNOWN}"
-    )
 
 
 def test_another_scheme_opens_nothing():
-    with pytest.raises(ValueError, match=r"^'udp://host' is neither the path of a recording nor"):
+    with pytest.raises(ValueError, match="'udp://host'"):
         open_source("udp://host")
 
 
 def test_a_parameter_that_is_given_twice():
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="twice"):
         parse("twin:?seed=1&seed=2")
-    assert str(error.value) == "twin:?seed=1&seed=2: a parameter is given twice"
 
 
 def test_an_invalid_uri():
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="no URI"):
         open_source("xela://[1:2")
-    assert str(error.value) == "xela://[1:2 is no URI: Invalid IPv6 URL"
 
 
 def test_a_parameter_without_a_value():
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="'loop'"):
         parse("twin:?object=can&loop")
-    assert str(error.value) == "twin:?object=can&loop: name=value expected, 'loop' given"
 
 
 def test_what_comes_after_a_hash_is_refused():
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="after #"):
         parse("twin:?object=can#1")
-    assert str(error.value) == "twin:?object=can#1: nothing after # expected, '1' given"
 
 
 def test_unknown_parameters():
     address = parse("twin:?objekt=can&seed=1&sede=2")[1]
     address.only("objekt", "seed", "sede")
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="objekt, sede; there are object, seed"):
         address.only("object", "seed")
-    assert str(error.value) == (
-        "twin:?objekt=can&seed=1&sede=2: unknown parameter objekt, sede; there are object, seed"
-    )
 
 
 def test_names_of_fingers():
@@ -98,20 +88,14 @@ def test_names_of_fingers():
     "given", ["thumb", "1:", ":thumb", "one:thumb", "-1:thumb", "1=thumb", "²:t"]
 )
 def test_invalid_names(given):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=repr(given)):
         parse(f"xela:?fingers={given}")[1].names()
-    assert str(error.value) == (
-        f"xela:?fingers={given}: fingers=1:thumb,2:index expected, {given!r} given"
-    )
 
 
 @pytest.mark.parametrize("given", ["1:thumb,2:thumb", "1:thumb,1:index"])
 def test_repeated_names(given):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=repr(given)):
         parse(f"xela:?fingers={given}")[1].names()
-    assert str(error.value) == (
-        f"xela:?fingers={given}: a name for each finger expected, {given!r} given"
-    )
 
 
 def test_an_existing_file_is_no_uri(tmp_path, monkeypatch):

@@ -137,22 +137,6 @@ PAGES = [
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(blocks.ROOT)))
-def test_a_numbered_list_goes_on(page):
-    """A block that is not indented ends a list: the site would number it 1, 2, 3, 1, 1."""
-    ended = fenced = False
-    for line in page.read_text("utf-8").splitlines():
-        fenced ^= line.startswith("```")
-        number = re.match(r"(\d+)\. ", line)
-        if fenced or line.startswith("```"):
-            ended = True
-        elif number:
-            assert number[1] == "1" or not ended, line
-            ended = False
-        elif line.strip() and not line.startswith(" "):
-            ended = True
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(blocks.ROOT)))
 def test_the_links_exist(page):
     for target, anchor in blocks.links_of(page):
         path = (page.parent / target).resolve() if target else page

@@ -348,12 +348,12 @@ def test_the_kernel_of_the_header_is_that_of_the_files():
 
 
 def test_a_field_that_is_not_understood_is_named():
-    with pytest.raises(ValueError, match=r"struct holdfast_x: a field, .*; 'int a, b' given"):
+    with pytest.raises(ValueError, match="'int a, b'"):
         structs_of("typedef struct { int a, b; } holdfast_x;")
 
 
 def test_what_cannot_be_exported_is_named():
-    with pytest.raises(ModelError, match=r"tare is the interval 1:2 s.*'first' or 'none'"):
+    with pytest.raises(ModelError, match="1:2 s"):
         header_of(paper(tare="1:2"), HAND, 150.0)
 
 

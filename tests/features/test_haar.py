@@ -118,9 +118,8 @@ def test_refuses_windows_that_are_no_pairs(window):
 
 @pytest.mark.parametrize("shape", [(20,), (20, 2), (20, 4), (2, 10, 3)])
 def test_refuses_other_shapes(shape):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="force"):
         haar_features(np.zeros(shape), 14)
-    assert str(raised.value) == f"a force of shape (n, 3) expected, {shape} given"
 
 
 @pytest.mark.parametrize("order", ["C", "F"])

@@ -40,9 +40,8 @@ KNOWN = (
     ],
 )  # fmt: skip
 def test_refuses_names(names, window, message):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=message):
         parse_features(names, window)
-    assert str(raised.value) == message
 
 
 def test_the_projects_own_features_have_a_name():
@@ -68,9 +67,8 @@ def test_the_projects_own_features_have_a_name():
     ],
 )  # fmt: skip
 def test_refuses_specifications(arguments, message):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=message):
         FeatureSpec(*arguments)
-    assert message in str(raised.value)
 
 
 def test_text():

@@ -163,9 +163,8 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_an_array_that_does_not_fit_is_refused(name):
     given, error, message = REFUSED[name]
-    with pytest.raises(error) as raised:
+    with pytest.raises(error, match=message):
         features(given, out=np.zeros((N, 6)), stop=1)
-    assert message in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -183,17 +182,15 @@ def test_an_array_that_does_not_fit_is_refused(name):
     ],
 )
 def test_a_result_that_does_not_fit_is_refused(out, error, message):
-    with pytest.raises(error) as raised:
+    with pytest.raises(error, match=message):
         features(out=out)
-    assert message in str(raised.value)
 
 
 def test_arrays_that_share_memory_are_refused():
     memory = np.zeros(N * 8)
     force, out = memory[: 3 * N].reshape(N, 3), memory[2 * N :].reshape(N, 6)
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="force and out"):
         features(force, out)
-    assert str(raised.value) == "force and out share memory"
 
 
 @pytest.mark.parametrize(
@@ -209,9 +206,8 @@ def test_numbers_out_of_range_are_refused(window, first, stop):
 
 @pytest.mark.parametrize(("first", "stop"), [(-1, 1), (2, 1), (0, 41)])
 def test_parts_out_of_range_are_refused(first, stop):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=f"samples {first} to {stop}"):
         forces(first=first, stop=stop)
-    assert str(raised.value) == f"samples {first} to {stop} of 40 given"
 
 
 @pytest.mark.parametrize("window", [2**62, 2**31, 10_000_000])
@@ -231,12 +227,10 @@ def test_other_types_of_numbers_are_refused(number):
 @pytest.mark.parametrize("n", [0, 1, 4, 6])
 def test_the_number_of_arguments_is_checked(n):
     arguments = (FORCE, WINDOW, 0, N, np.zeros((N, 6)), None)
-    with pytest.raises(TypeError) as raised:
+    with pytest.raises(TypeError, match=f"{n} given"):
         _extension.haar_features(*arguments[:n])
-    assert str(raised.value) == f"5 arguments expected, {n} given"
-    with pytest.raises(TypeError) as raised:
+    with pytest.raises(TypeError, match="6 arguments"):
         _extension.fingertip_force(*arguments[: n - 1])
-    assert str(raised.value) == f"6 arguments expected, {len(arguments[: n - 1])} given"
 
 
 @pytest.mark.parametrize(
@@ -255,9 +249,8 @@ def test_the_number_of_arguments_is_checked(n):
     ],
 )
 def test_taxels_that_do_not_fit_are_refused(arguments, message):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=message):
         forces(**arguments)
-    assert message in str(raised.value)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])

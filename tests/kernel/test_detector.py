@@ -188,7 +188,7 @@ class TestDetector:
                 return 1.0
 
         heads[0] = heads[0] | {"gain": Cutting()}
-        with pytest.raises(IndexError, match="list index out of range"):
+        with pytest.raises(IndexError):
             detector.set_rules(rules, heads, weights)
 
     def test_a_number_cannot_call_the_detector(self):
@@ -202,6 +202,6 @@ class TestDetector:
                 return 1.0
 
         heads[0] = heads[0] | {"gain": Calling()}
-        with pytest.raises(RuntimeError, match="another thread is using this detector"):
+        with pytest.raises(RuntimeError, match="another thread"):
             detector.set_rules(rules, heads, weights)
         assert detector.update({}, 1.0) is not None

@@ -164,9 +164,9 @@ def test_a_label_holds_until_the_next_sample_however_late():
 
 
 def test_arguments_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match=r"given times \(2,\), labels \(1,\), states \(2,\)"):
+    with pytest.raises(ValueError, match=r"labels \(1,\)"):
         event_metrics([0.0, 0.1], [S], [S, S])
-    with pytest.raises(ValueError, match="strictly increasing times expected"):
+    with pytest.raises(ValueError, match="times"):
         event_metrics([0.1, 0.0], [S, S], [S, S])
 
 

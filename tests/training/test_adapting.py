@@ -178,12 +178,8 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
 
 
 def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="thumb, index"):
         Setting.adapting(by_finger(known), shared=True)
-    assert str(raised.value) == (
-        "one classifier for all fingers (shared) cannot be adapted from mine, which has one for "
-        "each of thumb, index"
-    )
 
 
 def test_fingers_with_different_features(known):
@@ -192,16 +188,11 @@ def test_fingers_with_different_features(known):
     stable = msgspec.structs.replace(own.fingers["index"].stable, features=other)
     part = own.fingers["index"].with_heads(stable)
     unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="features"):
         Setting.adapting(unlike)
-    assert str(raised.value) == (
-        "mine has different features for its fingers; only a model with the same features for "
-        "all fingers can be adapted"
-    )
 
 
 def test_a_finger_that_the_model_lacks(known):
     own = [tiny_recording(seed, ("thumb", "ring")) for seed in (50, 51)]
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="'ring'"):
         train(own, Setting.adapting(by_finger(known), trials=3))
-    assert str(raised.value) == "the model has no finger 'ring'; it has thumb, index"

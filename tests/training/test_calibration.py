@@ -210,37 +210,30 @@ def test_features_that_changed_are_counted(model):
 
 def test_most_of_it_slip_is_refused(model):
     slips = [handling_recording(k, held=12.0, slip=0.8) for k in range(3)]
-    with pytest.raises(
-        TrainingError,
-        match=r"pad: most of this handling looks like slip \(activity \d\.\d\d, at most 2 ",
-    ):
+    with pytest.raises(TrainingError, match="pad"):
         calibrate(model, slips)
 
 
 def test_other_models_are_refused():
-    with pytest.raises(
-        ModelError,
-        match=r"builtin:twin was not trained on normalised features and cannot be calibrated; "
-        r"builtin:any can",
-    ):
+    with pytest.raises(ModelError, match="builtin:twin"):
         calibrate(Model.load("builtin:twin"), DATA)
 
 
 def test_another_sensor_is_refused(model):
     part = msgspec.structs.replace(model.fingers["*"], sensor="cup")
     own = msgspec.structs.replace(model, fingers={"*": part}, sensors={"cup": CUP})
-    with pytest.raises(ModelError, match="the model is for fingers with the sensor 'cup'"):
+    with pytest.raises(ModelError, match="'cup'"):
         calibrate(own, DATA)
 
 
 @pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
 def test_false_alarms_are_a_number(model, wrong):
-    with pytest.raises(ValueError, match="false alarms per minute of at least 0 expected"):
+    with pytest.raises(ValueError, match="false alarms"):
         calibrate(model, DATA, false_alarms=wrong)
 
 
 def test_no_recordings(model):
-    with pytest.raises(TrainingError, match="nothing is held in 0 recordings"):
+    with pytest.raises(TrainingError, match="nothing is held"):
         calibrate(model, [])
 
 
@@ -291,9 +284,7 @@ def test_still_handling_does_not_shrink_the_scales(model):
     (summary,) = report.sensors
     assert summary.still
     assert summary.after.raised <= summary.before.raised
-    with pytest.raises(
-        TrainingError, match=r"^pad: the arm hardly moved; move the arm as it will move later$"
-    ):
+    with pytest.raises(TrainingError, match="pad"):
         report.check()
 
 
@@ -321,5 +312,5 @@ def test_figures_that_are_worse(calibrated, change, worse):
     if not worse:
         report.check()
         return
-    with pytest.raises(TrainingError, match=r"^pad: worse on this handling than before \("):
+    with pytest.raises(TrainingError, match="pad: worse"):
         report.check()

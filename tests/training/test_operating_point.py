@@ -142,14 +142,11 @@ def test_reported_slips_are_counted_too():
 def test_too_many_alarms_are_refused():
     probability = np.full(6000, 0.9)
     probability[::100] = 1e-9
-    with pytest.raises(
-        TrainingError,
-        match="no threshold gives at most 1 alarms a minute of this handling; the least is 59",
-    ):
+    with pytest.raises(TrainingError, match="the least is 59"):
         choose_operating_point(handling(probability), part(), 1.0)
     slips = np.full(6000, 0.1)
     slips[100::100] = 1.0
-    with pytest.raises(TrainingError, match=r"at most 0 reported slips a minute .* least is 59"):
+    with pytest.raises(TrainingError, match="least is 59"):
         choose_operating_point(handling(np.full(6000, 0.9), slips), part(slip=0.5), 0.0)
 
 

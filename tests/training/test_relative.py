@@ -101,11 +101,8 @@ def test_units_and_gains_do_not_change_the_samples():
 @pytest.mark.parametrize("rate", [20.0, 1100.0])
 def test_a_rate_that_the_features_are_not_made_for(mixed, rate):
     odd = tiny_recording(6, rate=rate, n=round(10 * rate))
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=f"'grasp-6' has {rate:g} Hz"):
         scan_dataset([*mixed, odd], relative=True)
-    assert str(refusal.value) == (
-        f"recording 'grasp-6' has {rate:g} Hz, relative features expect 30 to 1000 Hz"
-    )
 
 
 def test_a_recording_without_labels_may_have_any_rate(mixed):

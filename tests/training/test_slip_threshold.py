@@ -262,22 +262,17 @@ class TestTuning:
 
     @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
     def test_a_rate_that_is_none(self, model, others, rate):
-        with pytest.raises(ValueError) as refusal:
+        with pytest.raises(ValueError, match="false alarms"):
             tune(model, others, rate, "slip")
-        assert str(refusal.value) == f"false alarms per minute above 0 expected, {rate:g} given"
 
     def test_a_model_without_a_rule(self, others):
-        with pytest.raises(ModelError) as refusal:
+        with pytest.raises(ModelError, match="slip rule"):
             tune(Model.load("builtin:noise-floor"), others, 1.0, "slip")
-        assert str(refusal.value).endswith(
-            "has no slip rule; train one on recordings whose slips are known"
-        )
 
     def test_recordings_without_labels_or_truth(self, model):
         bare = tiny_recording(1, states=(None,) * 4)
-        with pytest.raises(TrainingError) as refusal:
+        with pytest.raises(TrainingError, match="slips"):
             tune(model, [bare], 1.0, "slip")
-        assert str(refusal.value) == "1 recordings without slips that are known"
 
     def test_labels_without_slips_have_false_alarms_only(self, model):
         quiet = tiny_recording(1, states=(ContactState.NO_CONTACT, *[ContactState.STABLE] * 3))
@@ -286,8 +281,5 @@ class TestTuning:
         assert rule_of(tuned.model).choice.found is None
 
     def test_a_held_time_that_is_too_short(self, model, others):
-        with pytest.raises(TrainingError) as refusal:
+        with pytest.raises(TrainingError, match=r"0.28 min"):
             tune(model, others[:1], 1.0, "slip")
-        assert str(refusal.value) == (
-            "0.28 min of held time given; 1 false alarms a minute need at least 1 min"
-        )

@@ -337,18 +337,14 @@ def test_another_rate_is_evaluated_at_the_rate_of_the_model(grasps, split):
 )
 def test_refusals(given, split, message):
     setting = replace(SETTING, split=split)
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=message):
         train(given, setting)
-    assert str(refusal.value) == message
 
 
 def test_a_window_longer_than_the_data(grasps):
     setting = replace(SETTING, window=1000, features=parse_features("sigma", 1000))
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match="thumb"):
         train(grasps, setting)
-    assert str(refusal.value) == (
-        "thumb: 0 samples labelled stable and 0 labelled not stable; both classes are needed"
-    )
 
 
 def test_long_steps_report_progress(grasps):

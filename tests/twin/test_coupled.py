@@ -168,7 +168,7 @@ def test_a_matrix_of_other_nodes_is_refused() -> None:
     grip = coupled_grip("can")
     fine = fingertip_of(coupled=True).nodes[: MAX_COUPLED // 2]
     for nearness in (np.zeros((1, 1)), np.ones((len(fine), len(fine)))):
-        with pytest.raises(ValueError, match="nearness: a row for each node expected, and at most"):
+        with pytest.raises(ValueError, match="nearness"):
             touch(grip.state, grip.constants._replace(nearness=nearness), grip.bodies, grip.dt)
 
 

@@ -56,9 +56,7 @@ def test_profiles_disturb_in_their_order():
 
 @pytest.mark.parametrize("name", ["", "Reference", "../profile", "reference.toml"])
 def test_an_unknown_one_is_refused(name):
-    with pytest.raises(
-        ValueError, match=r"unknown profile .*; there are coupled, finger-gentle, finger-ref"
-    ):
+    with pytest.raises(ValueError, match="unknown profile"):
         profile(name)
 
 

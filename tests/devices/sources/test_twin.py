@@ -234,14 +234,13 @@ def test_metadata_are_plain(monkeypatch):
     ],
 )
 def test_invalid_parameters(text, message):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=message):
         open_source(text)
-    assert str(error.value).startswith(message)
 
 
 @pytest.mark.parametrize("speed", [-1.0, np.nan])
 def test_an_invalid_speed(speed):
-    with pytest.raises(ValueError, match="a speed of at least 0 expected"):
+    with pytest.raises(ValueError, match="speed"):
         open_source("twin:", speed=speed)
 
 

@@ -93,12 +93,8 @@ class TestOpening:
 
     def test_nothing_listens(self):
         port = free_port()
-        with pytest.raises(SourceError) as refusal:
+        with pytest.raises(SourceError, match=f":{port}; .*xela://auto; .*`holdfast play`"):
             open_source(f"xela://127.0.0.1:{port}").open()
-        assert str(refusal.value) == (
-            f"no server listens at 127.0.0.1:{port}; xela_server binds the address of the network "
-            "card: try xela://auto; without a hand, use `holdfast play`"
-        )
 
     def test_another_server_listens(self):
         with socket.create_server(("127.0.0.1", 0)) as other:
@@ -125,34 +121,27 @@ class TestOpening:
             raise OSError("No route to host")
 
         monkeypatch.setattr(socket, "create_connection", refuse)
-        with pytest.raises(SourceError) as refusal:
+        with pytest.raises(SourceError, match="No route to host"):
             open_source("xela://10.0.0.7").open()
-        assert str(refusal.value) == "10.0.0.7:5000 cannot be reached: No route to host"
 
     @pytest.mark.parametrize("first", [[], [WELCOME]])
     def test_no_samples_come(self, first, monkeypatch):
         monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
-        with server(first) as (port, _), pytest.raises(SourceError) as refusal:
+        with server(first) as (port, _), pytest.raises(SourceError, match="no samples"):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value) == (
-            f"connected to 127.0.0.1:{port}, but no samples came in 0.3 s: is it a XELA server, "
-            "with its sensors plugged in?"
-        )
 
     def test_only_invalid_packets_come(self, monkeypatch):
         monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
         broken = text(1, [sensor(counts(16), data="?")])
-        with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError) as refusal:
+        with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError, match="sensor 1"):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value) == (
-            f"127.0.0.1:{port} sends invalid packets: sensor 1: four hexadecimal digits a "
-            "number expected in data, with commas between"
-        )
 
     def test_the_server_closes_the_connection(self):
-        with server(broken=True) as (port, _), pytest.raises(SourceError) as refusal:
+        with (
+            server(broken=True) as (port, _),
+            pytest.raises(SourceError, match="closed the connection"),
+        ):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value).startswith(f"127.0.0.1:{port} closed the connection: ")
 
     @pytest.mark.parametrize(
         ("query", "message"),
@@ -288,7 +277,7 @@ def test_a_server_that_answers_before_the_request(n_headers):
         thread = threading.Thread(target=answer)
         thread.start()
         for _ in range(5):
-            with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA"):
+            with pytest.raises(SourceError, match="no XELA server"):
                 open_source(f"xela://127.0.0.1:{port}").open()
         thread.join()
 
@@ -309,6 +298,6 @@ def test_redirects_are_not_followed(location):
 
         thread = threading.Thread(target=redirect)
         thread.start()
-        with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA server"):
+        with pytest.raises(SourceError, match="no XELA server"):
             open_source(f"xela://127.0.0.1:{port}").open()
         thread.join()

@@ -155,6 +155,5 @@ def test_two_hands_have_names_of_their_own():
     ],
 )
 def test_what_does_not_fit(found, names, given, text):
-    with pytest.raises(SourceError) as refusal:
+    with pytest.raises(SourceError, match=text):
         xela_devices(found, names, given)
-    assert str(refusal.value) == text
