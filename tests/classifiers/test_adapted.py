@@ -172,7 +172,6 @@ def test_few_samples_help_a_prior_that_is_nearly_right():
 @pytest.mark.parametrize("stable", [True, False])
 def test_one_class_is_refused(stable):
     given = GIVEN._replace(positive=np.full(600, stable))
-    n = 600 if stable else 0
     with pytest.raises(TrainingError, match="labelled"):
         adapted(1.0, given)
 

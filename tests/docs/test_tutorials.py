@@ -105,28 +105,6 @@ def test_how_to(folder):
     assert (folder / "part.parquet").exists()
 
 
-def test_a_grid_search_on_real_recordings(folder, data_folder, capsys):
-    """The block of from-python.md, on recordings of three objects that are imported here."""
-    from holdfast.io import load_dataset
-    from holdfast.io.importers import import_recordings
-
-    (folder / "recordings").mkdir()
-    for place, recording in enumerate(import_recordings(data_folder / "uskin_pick_move")):
-        named = {**recording.metadata, "object": f"grasp {place % 3}"}
-        changed = recording.__class__(recording.name, recording.modules, named)
-        save_recording(changed, folder / "recordings" / f"{recording.name}.parquet")
-    (block,) = [
-        each
-        for each in blocks.blocks_of(DOCS / "tutorials" / "from-python.md")
-        if "GridSearchCV" in each.text
-    ]
-    names = {"__name__": "__main__", "recordings": load_dataset("recordings")}
-    blocks.run_block(block, names)
-    assert 0.5 < names["search"].best_score_ <= 1
-    assert (folder / "searched.json").exists()
-    assert capsys.readouterr().err == ""
-
-
 PAGES = [
     *DOCS.rglob("*.md"),
     blocks.ROOT / "README.md",

@@ -46,7 +46,6 @@ def test_rotations_are_exact(name):
 
 
 def test_unknown_names():
-    known = "uskin-curved, uskin-4x4, uskin-4x6, gtac, anyskin, papillarray"
     with pytest.raises(ValueError, match="'uskin'"):
         sensor("uskin")
     with pytest.raises(ValueError, match="'shadow'"):

@@ -159,10 +159,7 @@ def test_too_few_causes_are_a_warning():
     setting = Setting(trials=0, window=6, features=FEATURES, shared=True)
     model = train(recordings, setting, warn=warnings.append).model
     assert model.fingers[ANY_FINGER].head("cause") is None
-    assert warnings == [
-        "all fingers: unstable samples 1200 of disturbance given, at least 50 of each of two "
-        "causes expected; the model names no cause there"
-    ]
+    assert len(warnings) == 1 and "1200 of disturbance" in warnings[0]
 
 
 def test_the_fit_is_that_of_scikit_learn_with_balanced_classes():

@@ -92,11 +92,6 @@ def _journal_on_full_disk():
     return journal
 
 
-def test_no_folder(tmp_path):
-    with pytest.raises(OutputError, match="none/search"):
-        Journal(tmp_path / "none" / "search", "a").add(ONE, 0.5)
-
-
 def test_a_folder_in_its_place(tmp_path):
     with pytest.raises(OutputError, match="Is a directory"):
         Journal(tmp_path, "a")

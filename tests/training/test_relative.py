@@ -58,10 +58,8 @@ def test_a_sensor_of_one_taxel_leaves_out_what_compares_taxels(mixed, is_first):
     model = train(recordings, SETTING, warn=warnings.append).model
     kept = model.fingers[ANY_FINGER].features
     assert {spec.kind for spec in kept} == {"force_change", "shear_change", "load_to_noise"}
-    assert [text for text in warnings if "taxel" in text] == [
-        "residual, shear_residual, pressure_shift, moment_change left out: tiny has 1 taxel, they "
-        "need at least 2"
-    ]
+    (text,) = [text for text in warnings if "taxel" in text]
+    assert text.startswith("residual, shear_residual, pressure_shift, moment_change left out")
 
 
 def test_options_that_are_given_count(mixed):

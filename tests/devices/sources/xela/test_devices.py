@@ -58,10 +58,7 @@ def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     device = xela_devices({1: (model, 15)}, {})[1]
     (flat,) = device.modules.values()
     assert (flat.name, flat.n_taxels, flat.range) == (model.lower(), 15, (0.0, 65535.0))
-    assert device.notices == (
-        f"finger1: the layout of a {model} with 15 taxels is not known; a flat grid is assumed "
-        "(sensor=FILE.json in the URI gives another)",
-    )
+    assert "sensor=FILE.json" in device.notices[0]
 
 
 def test_a_model_without_a_layout_with_the_taxels_of_a_built_in_sensor():
@@ -79,10 +76,7 @@ def test_without_a_model():
 def test_without_a_model_but_with_the_taxels_of_a_built_in_sensor(name):
     device = xela_devices({1: ("", sensor(name).n_taxels)}, {})[1]
     assert device.modules == {"finger1": sensor(name)}
-    assert device.notices == (
-        f"finger1: the layout of a sensor without a model with {sensor(name).n_taxels} taxels is "
-        f"not known; {name} is assumed (sensor=FILE.json in the URI gives another)",
-    )
+    assert f"{name} is assumed" in device.notices[0]
 
 
 def test_a_given_sensor_is_taken_where_it_fits():
@@ -114,44 +108,12 @@ def test_two_hands_have_names_of_their_own():
 @pytest.mark.parametrize(
     ("found", "names", "given", "text"),
     [
-        (
-            {1: ("uSCuAH", 24)},
-            {},
-            None,
-            "sensor 1: 24 taxels given, 30 expected (uSCuAH: uskin-curved); sensor=FILE.json in "
-            "the URI gives another layout",
-        ),
-        (
-            {3: ("XR23AHRCPP", 240)},
-            {},
-            None,
-            "sensor 3: 240 taxels given, 368 expected (XR23AHRCPP: allegro-uskin); "
-            "sensor=FILE.json in the URI gives another layout",
-        ),
-        (
-            {1: TIP},
-            {2: "index"},
-            None,
-            "fingers= names 2; separate sensors have names, the server has 1 (uSCuAH)",
-        ),
-        (
-            {1: ("XR23AHRCPP", 368)},
-            {1: "thumb"},
-            None,
-            "fingers= names 1; separate sensors have names, the server has 1 (XR23AHRCPP)",
-        ),
-        (
-            {1: TIP},
-            {},
-            flat_grid("mine", 15),
-            "sensor= has 15 taxels and fits no sensor of the server: 1 (30 taxels)",
-        ),
-        (
-            {1: TIP, 2: TIP},
-            {1: "finger2"},
-            None,
-            "two modules have the same name: finger2, finger2; fingers= gives other names",
-        ),
+        ({1: ("uSCuAH", 24)}, {}, None, "24 taxels given, 30 expected .*sensor=FILE.json"),
+        ({3: ("XR23AHRCPP", 240)}, {}, None, "240 taxels given, 368 expected"),
+        ({1: TIP}, {2: "index"}, None, "fingers= names 2"),
+        ({1: ("XR23AHRCPP", 368)}, {1: "thumb"}, None, "fingers= names 1"),
+        ({1: TIP}, {}, flat_grid("mine", 15), "15 taxels"),
+        ({1: TIP, 2: TIP}, {1: "finger2"}, None, "finger2"),
     ],
 )
 def test_what_does_not_fit(found, names, given, text):

@@ -178,8 +178,8 @@ class TestWholeHand:
     @pytest.mark.parametrize(
         ("sensors", "text"),
         [
-            ({"finger1": sensor("uskin-curved")}, "finger1 is no module of allegro-uskin; it has"),
-            ({"thumb": sensor("uskin-4x4")}, "16 taxels given for thumb, 30 expected"),
+            ({"finger1": sensor("uskin-curved")}, "finger1"),
+            ({"thumb": sensor("uskin-4x4")}, "thumb"),
         ],
     )
     def test_modules_that_are_no_part_of_a_hand(self, sensors, text):
