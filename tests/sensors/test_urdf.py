@@ -90,9 +90,9 @@ def test_a_ring_of_joints_ends(finger):
 @pytest.mark.parametrize(
     ("old", "new", "hint"),
     [
-        ('xyz="0.01 0 0"', 'xyz="${width} 0 0"', "could not convert string to float"),
-        ('xyz="0.01 0 0"', 'xyz="0.01 0"', "three finite numbers expected, '0.01 0' given"),
-        ('xyz="0.01 0 0"', 'xyz="nan 0 0"', "three finite numbers expected, 'nan 0 0' given"),
+        ('xyz="0.01 0 0"', 'xyz="${width} 0 0"', "could not convert"),
+        ('xyz="0.01 0 0"', 'xyz="0.01 0"', "three finite numbers"),
+        ('xyz="0.01 0 0"', 'xyz="nan 0 0"', "three finite numbers"),
         ("</robot>", "", "no element found"),
     ],
 )
