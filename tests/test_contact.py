@@ -23,7 +23,6 @@ from holdfast.contact import (
     faults_of,
     hand_state,
     hand_states,
-    is_held,
     taxels_of,
     with_faults,
 )
@@ -53,10 +52,6 @@ def test_a_code_becomes_its_word(kind, first):
     for wrong in (first - 1, codes.stop, 1.5, "other"):
         with pytest.raises(ValueError, match=f"{wrong!r}"):
             kind(wrong)
-
-
-def test_no_label_is_unknown():
-    assert ContactState.UNKNOWN.code == 0
 
 
 @pytest.mark.parametrize(
@@ -91,10 +86,6 @@ def test_the_state_of_a_hand_at_many_instants_is_by_the_same_rule(codes, n_model
     held = enough_contacts(np.array([(fingers == STABLE).sum()]), n_model_fingers)
     (found,) = hand_states(np.array([UNSTABLE in codes]), np.array([UNKNOWN in codes]), held)
     assert found == hand_state(fingers, n_model_fingers)
-
-
-def test_nothing_is_held_before_the_first_unstable_sample():
-    assert not is_held(0.0, np.nan, hold=1.0, period=0.01)
 
 
 @given(st.lists(st.sampled_from(list(NAMES.values())), min_size=2, max_size=5))
@@ -240,19 +231,6 @@ def test_a_reported_state_lasted_and_the_chain_has_no_gap(states, n):
         assert len(states) > begin + n
         assert change.previous is previous is not change.state
         previous = change.state
-
-
-def test_a_flicker_is_no_change():
-    s, u = ContactState.STABLE, ContactState.UNSTABLE
-    (change,) = reported([s] * 20 + [u] * 3 + [s] * 20 + [u] * 3, 0.05)
-    assert (change.state, change.time) == (s, 0.0)
-
-
-def test_each_name_has_its_own_states():
-    s, u = ContactState.STABLE, ContactState.UNSTABLE
-    changes = StateChanges(["thumb", "hand"], 1e-9)
-    assert [e.finger for e in changes.update([s, u], 0.0)] == ["thumb", "hand"]
-    assert [e.finger for e in changes.update([s, s], 0.1)] == ["hand"]
 
 
 @pytest.mark.parametrize("duration", [-0.1, math.nan, math.inf])

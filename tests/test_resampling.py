@@ -3,7 +3,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from holdfast.contact import ContactState, Fault
+from holdfast.contact import ContactState
 from holdfast.detector import detect
 from holdfast.devices.sources.base import Arrival
 from holdfast.errors import StreamError
@@ -98,19 +98,6 @@ def test_gaps_stay(rate):
     assert found.readings[-1, 0, 0] == 2.0  # a stretch of one sample
 
 
-@pytest.mark.parametrize("rate", [40.0, 230.0])
-def test_one_sample(rate):
-    found = after([5.0], [3.0], rate)
-    assert (found.times.tolist(), found.readings[0, 0, 0]) == ([3.0], 5.0)
-
-
-def test_a_module_without_samples_stays():
-    empty = Tactile(SENSOR, np.empty(0), np.empty((0, 1, 3)))
-    one = made([1.0, 2.0], [0.0, 0.01]).modules["thumb"]
-    found = resample(Recording("made", {"thumb": one, "index": empty}), 150.0)
-    assert found.modules["index"].n_samples == 0
-
-
 @pytest.mark.parametrize(("source", "rate"), [*RATES, (100, 65), (150, 40)])
 @pytest.mark.parametrize("n", [2, 57, 58, 59, 200])
 def test_labels_stay_up_to_the_last_sample(source, rate, n):
@@ -195,39 +182,8 @@ def test_live_is_offline(pair, jitter, gaps, start, seed):
     assert np.array_equal(readings, expected.readings, equal_nan=True)
 
 
-@given(pair=st.sampled_from(RATES), n=st.integers(1, 300), seed=st.integers(0, 99))
-def test_live_returns_new_samples_at_once(pair, n, seed):
-    """The first samples of a recording give as many new samples as offline."""
-    source, rate = pair
-    module = uneven(source, 0.4, [100, 200], seed)
-    assume(abs(rate * module.period - 1) > 1e-9)
-    first = Tactile(SENSOR, module.times[:n], module.readings[:n])
-    resampler = Resampler(1 / module.period, rate)
-    samples = [x for k in range(n) for x in resampler.push(module.times[k], module.readings[k])]
-    whole = resample(Recording("made", {"thumb": module}), rate).modules["thumb"].times
-    until = first.times[-1] + 1e-3 / rate
-    assert [time for time, _ in samples] == [time for time in whole if time <= until]
-
-
-def test_live_readings_are_copies():
-    resampler, reading = Resampler(100.0, 150.0), np.ones((1, 3))
-    samples = resampler.push(0.0, reading)
-    reading[:] = 5.0
-    samples += resampler.push(0.01, reading)
-    reading[:] = 9.0
-    assert [value[0, 0] for _, value in samples] == pytest.approx([1.0, 1 + 4 * 2 / 3])
-
-
-@pytest.mark.parametrize(
-    ("time", "after"),
-    [
-        (0.5, " after 0.5 s"),
-        (0.4, " after 0.5 s"),
-        (np.nan, " after 0.5 s"),
-        (np.inf, " after 0.5 s"),
-    ],
-)
-def test_live_refuses_times_that_do_not_go_forward(time, after):
+@pytest.mark.parametrize("time", [0.5, 0.4, np.nan, np.inf])
+def test_live_refuses_times_that_do_not_go_forward(time):
     resampler = Resampler(100.0, 150.0)
     resampler.push(0.5, np.ones((1, 3)))
     with pytest.raises(StreamError, match="time"):
@@ -238,10 +194,8 @@ def test_live_refuses_times_that_do_not_go_forward(time, after):
 
 @pytest.mark.parametrize("rates", [(0.0, 100.0), (np.nan, 100.0), (100.0, -1.0)])
 def test_live_refuses_rates(rates):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="rate"):
         Resampler(*rates)
-    bad = next(rate for rate in rates if not rate > 0)
-    assert str(raised.value) == f"a rate above 0 Hz expected, {bad} given"
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
@@ -356,18 +310,6 @@ class TestSampleAndHold:
         lively = Tactile(module.sensor, module.times, module.readings + noise)
         mixed = Recording("mixed", {**held.modules, "index": lively})
         assert true_updates(mixed) is mixed
-
-    def test_a_sensor_that_stands_still_is_stuck(self, grasp):
-        _, held = slow_and_held(grasp)
-        modules = {}
-        for name, module in held.modules.items():
-            values = np.array(module.readings)
-            values[2400:] = values[2400]  # after 12 s
-            modules[name] = Tactile(module.sensor, module.times, values)
-        found = detect(Model.load("builtin:any"), Recording("still", modules)).fingers["thumb"]
-        stuck = (found.faults >> list(Fault).index(Fault.STUCK) & 1).astype(bool)
-        assert not stuck[found.times < 12.0].any()
-        assert stuck[found.times > 13.5].all()
 
 
 def test_a_reading_that_remains_is_a_sample_again():

@@ -14,7 +14,6 @@ import holdfast.kernel
 from exporters.c_detector import (
     STATES,
     WARNINGS,
-    CDetector,
     both,
     compare,
     random_samples,
@@ -26,9 +25,7 @@ from holdfast.errors import ModelError
 from holdfast.exporters import header_of
 from holdfast.exporters.c_header import structs_of
 from holdfast.io.importers import import_recordings
-from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
-from holdfast.training import calibrate
 
 pytestmark = [
     pytest.mark.slow,
@@ -176,48 +173,6 @@ def run_recording(python, c, recording):
     return seen
 
 
-def test_a_field_and_invalid_readings_give_the_same():
-    anyskin = sensor("anyskin")
-    rng, times = np.random.default_rng(4), np.arange(1200) / 100
-    turn = np.interp(times, [1, 3], [0, 1])[:, None, None] * [35, -40, 30]
-    press = np.interp(times, [5, 5.5, 9, 9.4], [0, 1, 1, 0])[:, None, None] * [20, 5, 300]
-    readings = rng.uniform(-300, 300, (5, 3)) + rng.normal(size=(1200, 5, 3)) + turn
-    readings += press * np.array([0.35, 0.8, 1.0, 0.6, 0.2])[:, None]
-    readings[20::40, 2] = 0
-    python, c = both(built_in("any"), {"thumb": anyskin}, 100.0)
-    hands = [
-        compare(python, c, {"thumb": x}, float(t)) for x, t in zip(readings, times, strict=True)
-    ]
-    seen = Counter(fault for hand in hands for fault in hand.fingers["thumb"].faults)
-    assert seen == {Fault.INVALID: 30}
-    assert {hand.state for hand in hands[300:490]} == {ContactState.NO_CONTACT}
-
-
-def test_a_calibrated_model_gives_the_same():
-    recordings = [synthetic_recording(f"made-{k}", k, tuple(HAND)) for k in range(2)]
-    model = calibrate(built_in("any"), recordings)
-    model = getattr(model, "model", model)
-    python, c = both(model, HAND, 150.0)
-    run_recording(python, c, recordings[0])
-
-
-@pytest.mark.parametrize("tare", ["0.5", "first", "none"])
-def test_every_tare_gives_the_same(tare):
-    model = paper(tare=tare)
-    python, c = both(model, HAND, 150.0)
-    for samples, time in random_samples(np.random.default_rng(4), HAND, 150.0, 700):
-        compare(python, c, samples, time)
-
-
-def test_a_stream_of_large_times_gives_the_same():
-    model, sensors, rate = made("any-newton")
-    python, c = both(model, sensors, rate)
-    for k, (samples, _) in enumerate(
-        random_samples(np.random.default_rng(6), sensors, rate, 1000, counts=False)
-    ):
-        compare(python, c, samples, 1.7e9 + k / rate)
-
-
 @pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "gtac_v2"])
 def test_real_recordings_give_the_same(format_, data_folder):
     folder = data_folder / format_
@@ -329,13 +284,6 @@ def test_the_header_says_what_it_was_made_of():
     assert re.search(r"#define HOLDFAST_HEADER_ID 0x[0-9a-f]{8}u", text)
     assert "@" not in text
     assert header_of(model, HAND, 150.0).text == text
-
-
-def test_the_size_of_the_state_is_that_of_the_struct():
-    for single in (False, True):
-        header = header_of(paper(), HAND, 150.0, single=single)
-        c = CDetector(header, HAND, single=single)
-        assert len(c.memory.raw) == header.state_size
 
 
 def test_the_kernel_of_the_header_is_that_of_the_files():

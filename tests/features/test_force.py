@@ -50,12 +50,6 @@ def test_half_a_second_is_the_same_number_of_samples_whenever_it_begins(start, r
     assert np.array_equal(found, fingertip_force(values, which, 0.5), equal_nan=True)
 
 
-def test_the_mean_of_the_first_75_samples_is_zero_force():
-    values = np.repeat(readings(1), 100, axis=0).astype(float)
-    values[:75] += np.linspace(-1, 1, 75)[:, None, None]
-    assert np.abs(fingertip_force(values, CURVED)[75:]).max() < 1e-6
-
-
 def test_first():
     values = readings(5)
     found = fingertip_force(values, CURVED, "first")
@@ -140,9 +134,9 @@ def test_the_future_changes_nothing(k, tare):
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
-        ((9, 24, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 24, 3) given"),
-        ((9, 30, 2), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 30, 2) given"),
-        ((30, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (30, 3) given"),
+        ((9, 24, 3), "uskin-curved"),
+        ((9, 30, 2), "uskin-curved"),
+        ((30, 3), "uskin-curved"),
     ],
 )
 def test_refuses_other_shapes(shape, message):

@@ -6,7 +6,6 @@ import ctypes
 import numpy as np
 import pytest
 
-from holdfast.features import haar_features
 from holdfast.kernel import _extension, batch
 
 N = 5000
@@ -81,30 +80,10 @@ def test_the_limit_of_threads(monkeypatch, given, expected):
     assert batch.max_threads() >= 1
 
 
-def test_only_the_rows_of_the_part_are_written():
-    found = features(out=np.full((N, 6), 7.0), first=20, stop=2000)
-    assert (found[:20] == 7.0).all()
-    assert (found[2000:] == 7.0).all()
-    assert np.array_equal(found[20:2000], haar_features(FORCE, WINDOW)[20:2000])
-
-
 def read_only(values):
     values = values.copy()
     values.flags.writeable = False
     return values
-
-
-SAME_NUMBERS = {
-    "read-only": read_only(FORCE),
-    "a memoryview": memoryview(FORCE),
-    "a native byte order by name": FORCE.astype("=f8"),
-    "a part of an array": np.vstack([FORCE, FORCE])[N:],
-}
-
-
-@pytest.mark.parametrize("name", SAME_NUMBERS)
-def test_gives_the_same_numbers(name):
-    assert np.array_equal(features(SAME_NUMBERS[name]), features(), equal_nan=True)
 
 
 class Liar:
@@ -235,20 +214,6 @@ def test_the_number_of_arguments_is_checked(n):
 def test_taxels_that_do_not_fit_are_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         forces(**arguments)
-
-
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
-def test_a_force_that_is_not_finite_is_nan(bad):
-    readings = READINGS.copy()
-    readings[3, 2, 1] = bad
-    found = forces(readings)
-    assert np.isnan(found[3]).all()
-    assert np.array_equal(np.delete(found, 3, axis=0), np.delete(forces(), 3, axis=0))
-
-
-def test_a_sensor_without_taxels_has_no_force():
-    empty = forces(np.zeros((4, 0, 3)), np.zeros((0, 3)), np.zeros((0, 3, 3)))
-    assert (empty == 0).all()
 
 
 def test_buffers_are_released():

@@ -228,11 +228,6 @@ def test_false_alarms_are_a_number(model, wrong):
         calibrate(model, DATA, false_alarms=wrong)
 
 
-def test_no_recordings(model):
-    with pytest.raises(TrainingError, match="nothing is held"):
-        calibrate(model, [])
-
-
 def test_a_threshold_that_is_tuned_later_wins(calibrated):
     moved = calibrated.model.with_threshold("stable", 0.125).finger("*", PAD)
     assert moved.stable.threshold == 0.125

@@ -16,7 +16,7 @@ from holdfast.training.model_fit import fit_recordings
 from holdfast.training.splits import split_data
 from holdfast.training.training_samples import SamplesPlan, gather_samples
 
-from .build import TINY, tiny_module, tiny_recording
+from .build import TINY, tiny_recording
 
 ANY = parse_features("any")
 SETTING = Setting(features=ANY, trials=0, hold=0.1)
@@ -106,15 +106,3 @@ def test_a_rate_that_the_features_are_not_made_for(mixed, rate):
 def test_a_recording_without_labels_may_have_any_rate(mixed):
     bare = tiny_recording(7, rate=5.0, n=50, states=[None] * 4)
     assert len(scan_dataset([*mixed, bare], relative=True).recordings) == 4
-
-
-def test_other_features_still_need_one_sensor(mixed):
-    with pytest.raises(TrainingError, match="has the sensor"):
-        train(mixed, replace(SETTING, features=parse_features("F_a,sigma"), shared=False))
-
-
-def test_modules_may_have_any_sensors_within_a_recording():
-    own = tiny_recording(8)
-    other = tiny_module(9, sensor=sensor("anyskin"))
-    both = replace(own, modules={**own.modules, "palm": other})
-    assert len(samples_of([both])[ANY_FINGER].samples.positive) > 0

@@ -212,14 +212,6 @@ def test_the_contact_threshold_of_a_fold_leaves_out_its_recordings(grasps):
     assert thresholds[0] < 100 < min(thresholds[1:])
 
 
-def test_a_shared_model(grasps):
-    model = train(grasps, replace(QUICK, shared=True)).model
-    assert set(model.fingers) == {"*"}
-    assert set(model.training.parameters) == {"*"}
-    stranger = tiny_recording(20, fingers=("ring",))
-    assert set(compute_decisions(model, stranger).fingers) == {"ring"}
-
-
 # --- what is missing -------------------------------------------------------------------------
 
 
@@ -260,13 +252,6 @@ def test_recordings_with_one_class_help_those_with_both(grasps):
     metrics = train(given, SETTING).cross_validation
     assert by_name(metrics)["grasp-25"].fingers["thumb"].auc is None
     assert metrics.pooled.auc is not None
-
-
-@pytest.mark.parametrize("split", ["recording", "random"])
-def test_another_rate_is_evaluated_at_the_rate_of_the_model(grasps, split):
-    fast = tiny_recording(26, n=1200, rate=300.0)
-    metrics = train([*grasps, fast], replace(SETTING, split=split)).cross_validation
-    assert by_name(metrics)["grasp-26"].fingers["thumb"].n == pytest.approx(345, abs=3)
 
 
 @pytest.mark.parametrize(

@@ -35,12 +35,6 @@ def torques(controller, joints, target, bias=0.0, tick=0):
     return out[:16]
 
 
-def test_the_same_seed_gives_the_same_controller():
-    for one, other in zip(draw(3), draw(3), strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert (draw(3).noise != draw(4).noise).all()
-
-
 def test_a_set_point_off_by_a_little_gives_a_proportional_torque(plain):
     got = torques(plain, 0.0, 0.05)
     np.testing.assert_allclose(got, PROPORTIONAL * 0.05, atol=0.5 * TORQUE_STEP + 1e-12)

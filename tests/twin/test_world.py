@@ -96,12 +96,3 @@ def test_closed_fingers_press_and_hold_it_alone():
     assert made.outside[2] < -0.5
     assert not made.outside[:2].any()
     assert (made.loads != pressed).any()
-
-
-def test_each_push_begins_where_the_object_is():
-    made = run(world(), 0.3, hold=0.0)  # falls
-    run(made, 1 / RATE, hold=0.0, disturbance=0)
-    assert made._origin[2] < -0.1
-    first = made._origin.copy()
-    run(made, 2 / RATE, hold=0.0, disturbance=0)
-    np.testing.assert_array_equal(made._origin, first)

@@ -1,7 +1,6 @@
 import importlib
 import itertools
 import sys
-import threading
 import time
 from contextlib import contextmanager
 
@@ -237,15 +236,6 @@ def test_another_number_of_magnetometers_after_opening_is_an_error(board):
     assert "4 magnetometers" in str(error.value)
 
 
-def test_unplugged_while_opening_is_an_error(board):
-    source = open_source(f"serial://{board.path}")
-    unplug = threading.Timer(0.2, board.unplug)
-    unplug.start()
-    with pytest.raises(SourceError, match="serial ports"):
-        source.__enter__()
-    unplug.join()
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -264,10 +254,6 @@ def test_unplugged_while_opening_is_an_error(board):
 def test_invalid_parameters(text, message):
     with pytest.raises(ValueError, match=message):
         open_source(text)
-
-
-def test_a_port_of_windows():
-    assert open_source("serial:COM3")._path == "COM3"
 
 
 def test_without_pyserial_the_extra_is_named(monkeypatch):
