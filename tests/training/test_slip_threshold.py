@@ -70,13 +70,6 @@ def slips_of(model, recordings):
     return summarise([compute_decisions(model, made) for made in recordings]).slips.pooled
 
 
-def unsmoothed(model):
-    """The model whose probability of a slip is that of each sample alone."""
-    return model.changed(
-        lambda part: part.with_heads(msgspec.structs.replace(part.slip, smoothing=0.0))
-    )
-
-
 class TestTraining:
     def test_the_rule_finds_slips_of_other_recordings(self, trained, others):
         model, warnings = trained[0].model, trained[1]
