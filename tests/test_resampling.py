@@ -61,13 +61,6 @@ def test_a_slow_sine_stays(source, rate):
     assert np.abs(found.readings[2:, 0, 0] - expected[2:]).max() < 1.01 * one_sample
 
 
-def test_the_rate_it_has_changes_nothing():
-    times = np.arange(50) / 100
-    found = after(np.arange(50.0) ** 2, times, 100.0)
-    assert found.times == pytest.approx(times)
-    assert found.readings[:, 0, 0] == pytest.approx(np.arange(50.0) ** 2, abs=1e-6)
-
-
 def test_down_is_the_mean_since_the_last():
     found = after(np.arange(13.0), np.arange(13) / 400, 100.0)
     assert found.readings[:, 0, 0].tolist() == [0.0, 2.5, 6.5, 10.5]
@@ -76,16 +69,6 @@ def test_down_is_the_mean_since_the_last():
 def test_up_is_linear():
     found = after([0.0, 1.0, 0.0], np.arange(3) / 100, 400.0)
     assert found.readings[:, 0, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1, 0.75, 0.5, 0.25, 0])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("source", "rate"), RATES)
-def test_time_since_1970(source, rate):
-    signal = np.random.default_rng(0).normal(size=20_000)
-    one = after(signal, np.arange(20_000) / source, rate)
-    two = after(signal, 1.7e9 + np.arange(20_000) / source, rate)
-    assert two.times - 1.7e9 == pytest.approx(one.times, abs=1e-6)
-    assert two.readings == pytest.approx(one.readings, abs=1e-3)
 
 
 @pytest.mark.parametrize("rate", [40.0, 100.0, 230.0])

@@ -1,6 +1,3 @@
-import subprocess
-import sys
-
 from holdfast.plots.style import PAPER, page_figure, series_styles
 
 
@@ -8,16 +5,6 @@ def test_eighteen_styles_are_different():
     styles = series_styles(f"method {k}" for k in range(18))
     assert len(set(styles.values())) == 19  # and the paper's
     assert series_styles(["a", PAPER, "b"])["b"] == series_styles(["a", "b"])["b"]
-
-
-def test_pyplot_is_not_imported():
-    """pyplot keeps every figure that it makes until it is closed."""
-    program = (
-        "import sys; from holdfast_lab.figures import curves, dots, experiment\n"
-        "curves.draw_lines({}, 'x'); dots.draw_dots({})\n"
-        "assert 'matplotlib.pyplot' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
 
 
 def test_a_notebook_shows_a_figure_as_a_picture_that_is_always_the_same():

@@ -152,9 +152,3 @@ def test_energy_is_conserved_without_friction():
     mujoco.mj_forward(model, data)
     assert abs(data.energy[0] - before[0]) > 1e-3  # it went up and down
     assert data.energy.sum() == pytest.approx(before.sum(), abs=1e-6)
-
-
-def test_nothing_collides_in_mujoco(hand):
-    hand.data.qpos[:N_JOINTS] = hand.limits()[:, 1]
-    mujoco.mj_forward(hand.model, hand.data)
-    assert hand.data.ncon == 0

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from holdfast.sensors.types import Array
 from holdfast.twin.objects import (
     BUILT_IN_OBJECTS,
-    OTHER_OBJECTS,
     GraspObject,
     distance_to,
     load_objects,
@@ -138,15 +137,6 @@ def test_sizes_are_where_the_surface_is(name: str) -> None:
     np.testing.assert_allclose(distance_to(one, ends), 0, atol=1e-12)
 
 
-def test_a_frustum_is_as_wide_as_the_table_says() -> None:
-    one = replace(SMOOTH["bottle"])
-    foot, top, half = one.size[:3]
-    for share in (-0.8, 0.0, 0.8):
-        wide = (foot + top) / 2 + share * (top - foot) / 2
-        point = [wide, 0.0, middle_of(one) + share * half]
-        assert float(distance_to(one, point)) == pytest.approx(0, abs=1e-12)
-
-
 @pytest.mark.parametrize("name", sorted(OBJECTS))
 def test_texture_is_bounded_and_has_no_seam(name: str) -> None:
     one = OBJECTS[name]
@@ -196,33 +186,6 @@ def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
     assert cone.inertia[2] == pytest.approx(moment, rel=0.01)
     height = 0.1 * (0.04**2 + 2 * 0.04 * 0.02 + 3 * 0.02**2) / (4 * (0.04**2 + 0.0008 + 0.02**2))
     assert -cone.foot[2] == pytest.approx(height, rel=0.01)
-
-
-def test_the_built_in_table() -> None:
-    assert len(OBJECTS) == 6
-    assert len({one.shape for one in OBJECTS.values()}) == 6
-    for name, one in OBJECTS.items():
-        assert one.name == name
-        assert object_named(name) is one
-        assert 0.05 <= one.mass <= 0.35
-        assert 0.03 <= one.radius <= 0.034
-        assert 6e-6 <= one.texture_amplitude <= 60e-6
-        assert 1e-3 <= one.texture_wavelength <= 3e-3
-        assert one.mu_kinetic < one.mu_static
-        assert one.finger_height < one.half_height
-        assert not one.inertia.flags.writeable
-
-
-def test_other_objects_differ_from_the_built_in_ones() -> None:
-    others = load_objects(OTHER_OBJECTS)
-    assert len(others) == 6
-    assert not set(others) & set(OBJECTS)
-    looks = {(one.shape, one.size, one.mass) for one in OBJECTS.values()}
-    for one in others.values():
-        assert (one.shape, one.size, one.mass) not in looks
-        assert 0.05 <= one.mass <= 0.35
-        assert one.mu_kinetic < one.mu_static
-        assert one.finger_height < one.half_height
 
 
 def test_objects_can_be_pickled_and_copied() -> None:

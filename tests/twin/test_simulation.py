@@ -135,26 +135,6 @@ class TestTruth:
             away = np.linalg.norm(finger["contact_force"], axis=1) == 0
             assert not finger["slip_speed"][away].any()
 
-    def test_friction_keeps_to_coulombs_limit(self, held):
-        """On a can all normals of a fingertip lie within its patch, near that of its middle."""
-        span, mu = quiet(held), object_named("can").mu_static
-        poses = held.truth.hand["object_pose"][span]
-        for finger in held.truth.fingers.values():
-            force = turns(poses).inv().apply(finger["contact_force"][span])
-            where = (
-                turns(poses)
-                .inv()
-                .apply(
-                    turns(finger["tip_pose"][span]).apply([0.0, 0.0, 0.016])
-                    + finger["tip_pose"][span, :3]
-                    - poses[:, :3]
-                )
-            )
-            inward = -where[:, :2] / np.linalg.norm(where[:, :2], axis=1)[:, None]
-            pressed = (force[:, :2] * inward).sum(axis=1)
-            assert (pressed > 0).all()
-            assert (np.abs(force[:, 2]) <= mu * np.linalg.norm(force[:, :2], axis=1)).all()
-
     def test_motion_follows_from_the_forces(self, pushed):
         """Newton's law on the object, over the whole grasp: impulse is change of momentum."""
         truth, mass = pushed.truth, pushed.metadata["object_mass"]

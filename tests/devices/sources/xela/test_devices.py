@@ -3,46 +3,10 @@ import pytest
 
 from holdfast.devices.sources.xela.devices import xela_devices
 from holdfast.errors import SourceError
-from holdfast.sensors import hand, sensor
+from holdfast.sensors import sensor
 from holdfast.sensors.xela_models import flat_grid
 
 TIP = ("uSCuAH", 30)
-
-
-@pytest.mark.parametrize("model", ["XR23AHLCPP", "XR23AHRCPP", "xr23ahrcpp"])
-def test_a_whole_hand_becomes_its_modules(model):
-    allegro = hand("allegro-uskin")
-    device = xela_devices({1: (model, 368)}, {})[1]
-    assert device.n_taxels == 368
-    assert device.modules == {name: module.sensor for name, module in allegro.modules.items()}
-    readings = np.arange(368 * 3).reshape(368, 3)
-    parts, expected = device.split(readings), allegro.split(readings)
-    assert parts.keys() == expected.keys()
-    for name, part in parts.items():
-        np.testing.assert_array_equal(part, expected[name])
-    assert device.notices == ()
-
-
-@pytest.mark.parametrize(
-    ("model", "name"),
-    [
-        ("uSCuAH", "uskin-curved"),
-        ("USCUAH", "uskin-curved"),
-        ("XR1944", "uskin-4x4"),
-        ("XR1844", "uskin-4x4"),
-        ("uSPa44", "uskin-4x4"),
-        ("uSFtAH", "uskin-4x4"),
-        ("uSPa46", "uskin-4x6"),
-        ("xr1946", "uskin-4x6"),
-    ],
-)
-def test_separate_sensors_that_are_built_in(model, name):
-    built_in = sensor(name)
-    device = xela_devices({1: (model, built_in.n_taxels)}, {})[1]
-    assert device.modules == {"finger1": built_in}
-    assert device.notices == ()
-    readings = np.zeros((built_in.n_taxels, 3))
-    assert device.split(readings)["finger1"] is readings
 
 
 def test_names():
@@ -59,11 +23,6 @@ def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     (flat,) = device.modules.values()
     assert (flat.name, flat.n_taxels, flat.range) == (model.lower(), 15, (0.0, 65535.0))
     assert "sensor=FILE.json" in device.notices[0]
-
-
-def test_a_model_without_a_layout_with_the_taxels_of_a_built_in_sensor():
-    (flat,) = xela_devices({1: ("uspr-dsf", 30)}, {})[1].modules.values()
-    assert (flat.name, flat.n_taxels) == ("uspr-dsf", 30)
 
 
 def test_without_a_model():

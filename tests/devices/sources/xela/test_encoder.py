@@ -14,7 +14,6 @@ from holdfast.devices.sources.xela.encoder import (
     REST_READING,
     SampleBatcher,
     XelaEncoder,
-    is_part_of_hand,
 )
 from holdfast.sensors import Sensor, hand, sensor
 from holdfast.sensors.xela_models import flat_grid
@@ -147,15 +146,6 @@ class TestWholeHand:
             for name in set(WHOLE) - set(TIPS):
                 assert (np.abs(arrival.samples[name].astype(float) - REST_READING) < 300).all()
 
-    def test_what_is_at_rest_is_always_the_same(self):
-        packets = [
-            [encoder.packet(samples_of(TIPS, k), START + k, 0.0) for k in range(3)]
-            for encoder in (XelaEncoder(TIPS, whole_hand=True), XelaEncoder(TIPS, whole_hand=True))
-        ]
-        assert packets[0] == packets[1]
-        first, second = (a.samples["palm/1"] for a in decoded(XelaEncoder(WHOLE), packets[0])[:2])
-        assert 0 < np.abs(first.astype(int) - second).max() <= 4
-
     def test_a_module_without_a_sample_repeats_its_last(self):
         encoder = XelaEncoder(WHOLE)
         first = samples_of(WHOLE)
@@ -164,16 +154,6 @@ class TestWholeHand:
         _, arrival = decoded(encoder, packets)
         for name, readings in (first | thumb).items():
             np.testing.assert_array_equal(arrival.samples[name], readings)
-
-    def test_newtons(self):
-        tips = dict.fromkeys(TIPS, newtons("uskin-curved"))
-        encoder = XelaEncoder(tips, whole_hand=True)
-        force = np.random.default_rng(0).normal(size=(30, 3))
-        (arrival,) = decoded(
-            encoder, [encoder.packet({"thumb": force}, START, 0.0)], calibrated=True
-        )
-        np.testing.assert_array_equal(arrival.samples["thumb"], force)
-        assert not arrival.samples["index"].any()
 
     @pytest.mark.parametrize(
         ("sensors", "text"),
@@ -245,13 +225,6 @@ def test_a_sensor_unknown_to_xela_keeps_its_name():
 def test_an_unknown_version():
     with pytest.raises(ValueError, match=r"2\.0"):
         XelaEncoder(TIPS, version="2.0")
-
-
-def test_what_is_part_of_an_allegro_hand():
-    tip, patch = sensor("uskin-curved"), sensor("uskin-4x4")
-    assert is_part_of_hand({"thumb": tip, "index": tip})
-    assert not is_part_of_hand({"finger1": tip})
-    assert not is_part_of_hand({"thumb": patch})
 
 
 def batches(batcher, given):
