@@ -1,7 +1,7 @@
 import socket
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -85,26 +85,6 @@ class TestOpening:
         port = free_port()
         with pytest.raises(SourceError, match=f":{port}; .*xela://auto; .*`holdfast play`"):
             open_source(f"xela://127.0.0.1:{port}").open()
-
-    def test_another_server_listens(self):
-        with socket.create_server(("127.0.0.1", 0)) as other:
-            port = other.getsockname()[1]
-
-            def answer():
-                connection, _ = other.accept()
-                with connection:
-                    connection.recv(4096)
-                    connection.sendall(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
-
-            thread = threading.Thread(target=answer)
-            thread.start()
-            with pytest.raises(SourceError) as refusal:
-                open_source(f"xela://127.0.0.1:{port}").open()
-            thread.join()
-        assert str(refusal.value) == (
-            f"the server at 127.0.0.1:{port} is no XELA server: "
-            "server rejected WebSocket connection: HTTP 404"
-        )
 
     def test_a_host_that_cannot_be_reached(self, monkeypatch):
         def refuse(*_, **__):
@@ -258,22 +238,30 @@ def test_a_server_that_answers_before_the_request(n_headers):
         thread.join()
 
 
-@pytest.mark.parametrize("location", ["ws://127.0.0.1:{other}/", "ws://localhost:{port}/", "/b"])
-def test_redirects_are_not_followed(location):
-    """A server that redirects its clients to another one."""
-    with server([patch(1)]) as (other, _), socket.create_server(("127.0.0.1", 0)) as listener:
-        port = listener.getsockname()[1]
-        where = location.format(other=other, port=port)
+@contextmanager
+def answering(head):
+    """The port of a server that answers its first request."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
 
-        def redirect():
+        def answer():
             connection, _ = listener.accept()
             with connection:
                 connection.recv(1 << 16)
-                head = f"HTTP/1.1 302 Found\r\nLocation: {where}\r\nContent-Length: 0\r\n\r\n"
-                connection.sendall(head.encode())
+                connection.sendall(f"HTTP/1.1 {head}\r\nContent-Length: 0\r\n\r\n".encode())
 
-        thread = threading.Thread(target=redirect)
+        thread = threading.Thread(target=answer)
         thread.start()
-        with pytest.raises(SourceError, match="no XELA server"):
-            open_source(f"xela://127.0.0.1:{port}").open()
+        yield listener.getsockname()[1]
         thread.join()
+
+
+@pytest.mark.parametrize(
+    "head", ["404 Not Found", "302 Found\r\nLocation: /b", "302 Found\r\nLocation: ws://{other}/"]
+)
+def test_another_server_is_no_xela_server_and_redirects_are_not_followed(head):
+    with (
+        server([patch(1)]) as (other, _),
+        answering(head.format(other=f"127.0.0.1:{other}")) as port,
+        pytest.raises(SourceError, match=f"127.0.0.1:{port} is no XELA server"),
+    ):
+        open_source(f"xela://127.0.0.1:{port}").open()
