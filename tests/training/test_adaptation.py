@@ -6,7 +6,7 @@ import pytest
 
 from holdfast.classifiers import Linear, Samples
 from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
-from holdfast.training.adaptation import choose_adaptation, choose_nearest
+from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
 from holdfast.training.finger_samples import FingerSamples
 
 RIGHT = Linear((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), ((2.0, -1.0, 0.0),), (0.5,))
@@ -82,3 +82,17 @@ def test_one_class_in_a_fold_keeps_the_model():
 )
 def test_the_nearest_within_one_standard_error(losses, row):
     assert choose_nearest(np.array(losses)) == row
+
+
+@pytest.mark.parametrize(
+    ("change", "finger", "named"),
+    [
+        (NONE, "*", "kept mine: "),
+        (CALIBRATION, "*", "the calibration of mine (C = 0.001)"),
+        (WEIGHTS, "thumb", "the weights of mine for thumb (C = 0.001)"),
+    ],
+)
+def test_the_line_for_the_user_names_what_was_adapted(change, finger, named):
+    line = Adaptation({"change": change, "C": 1e-3}, 2, 0.4, 0.3).describe("mine", finger)
+    assert named in line
+    assert "2 recordings" in line

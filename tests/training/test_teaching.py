@@ -95,9 +95,13 @@ class TestFigures:
 
     def test_the_verdict_has_the_number_and_the_rate_of_the_hand(self, taught):
         pooled = taught.slips.pooled
+        low, high = taught.slips.intervals.incipient["0.1"]
+        rate = pooled.false_alarms_per_minute["held"]
         assert taught.verdict.startswith("48 slips in 6 grasps")
+        assert f"{pooled.incipient['0.1']:.0f} % ({low:.0f} to {high:.0f})" in taught.verdict
+        assert f"at {rate:.2g} false alarms a minute" in taught.verdict
         assert f"{taught.hand_alarms:.2g} of the hand" in taught.verdict
-        assert taught.hand_alarms >= pooled.false_alarms_per_minute["held"]
+        assert taught.hand_alarms >= rate
 
     def test_the_curve_has_the_threshold_of_each_rate_and_that_of_the_model(self, taught):
         assert [point.wanted for point in taught.curve] == sorted([0.5, 1.0, 1.5, 3.0, 6.0])

@@ -37,6 +37,7 @@ def late(n_events):
     return np.where(np.arange(len(LABELS)) < 1000 * n_events, STABLE, LABELS)
 
 
+CALM = np.where(np.arange(12_000) < 5000, UNSTABLE, STABLE)
 ALWAYS = np.full(12_000, STABLE)
 NEVER = np.full(12_000, UNSTABLE)
 
@@ -52,6 +53,10 @@ NEVER = np.full(12_000, UNSTABLE)
         ((LABELS, RIGHT, LABELS, 7), "Good for an automatic reaction: at most 0.27 .* 0 % of 84"),
         ((late(2), RIGHT, LABELS, 7), "Good for a person who watches: at most 0.27 .* 17 % of 84"),
         ((late(5),), "Not good enough: at most 1.9 false alarms a minute, 42 % of 12 onsets"),
+        (
+            (CALM, np.where(CALM == STABLE, 0.9, 0.1), CALM),
+            "Not enough data: 0 of 20 events, 1.1 of 10 .* at most 2.6 .* no instability .* 58 %",
+        ),
         ((LABELS, RIGHT, NEVER), "Not enough data: 0 of 20 events, 0 of 10 held minutes, 1 of 5"),
     ],
 )
