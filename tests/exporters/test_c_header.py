@@ -39,8 +39,6 @@ COMPILERS = {
     "clang": ("clang", "-std=c99"),
     "g++": ("g++", "-x", "c++", "-std=c++17"),
     "clang++": ("clang++", "-x", "c++", "-std=c++17"),
-    "sanitized": ("gcc", "-std=c99", "-g", "-fsanitize=address,undefined",
-                  "-fno-sanitize-recover=all"),
 }  # fmt: skip
 
 
@@ -118,9 +116,8 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "compiler", "level"),
-    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"),
-     *((name, ("gcc", "clang")[k % 2], "-O0") for k, name in enumerate(MODELS) if name != "rich")],
-)  # fmt: skip
+    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"), ("paper", "gcc", "-O0")],
+)
 def test_single_precision_has_no_hidden_conversion(name, compiler, level, tmp_path):
     compiled(compiler, tmp_path, header_of(*made(name), single=True), level)
 
@@ -142,8 +139,7 @@ def test_random_samples_give_the_same(name):
     assert len(seen) > 5 and (Fault.OFFSET in seen) == counts
 
 
-@pytest.mark.parametrize("name", ["paper", "twin", "any"])
-@pytest.mark.parametrize("in_contact", [False, True])
+@pytest.mark.parametrize(("name", "in_contact"), [("paper", False), ("twin", False), ("any", True)])
 def test_a_grasp_gives_the_same(name, in_contact):
     model, sensors, rate = made(name)
     recording = synthetic_recording("made", 3, tuple(sensors))
@@ -173,7 +169,7 @@ def run_recording(python, c, recording):
     return seen
 
 
-@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "gtac_v2"])
+@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac"])
 def test_real_recordings_give_the_same(format_, data_folder):
     folder = data_folder / format_
     if not folder.is_dir():

@@ -234,7 +234,7 @@ def test_an_invalid_line_is_refused(tmp_path: Path, old: str, new: str, message:
     path = tmp_path / "t.toml"
     assert old in LINE
     path.write_text(LINE.replace(old, new), "utf-8")
-    with pytest.raises(ValueError, match=f"mug: {message}"):
+    with pytest.raises(ValueError, match=f"mug: .*{message}"):
         load_objects(path)
 
 
