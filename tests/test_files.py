@@ -71,6 +71,15 @@ def test_a_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
     assert target.read_text() == "old"
 
 
+def test_no_temporary_file_can_be_made(tmp_path, monkeypatch):
+    def read_only(self, mode=0o666, exist_ok=True):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    monkeypatch.setattr(Path, "touch", read_only)
+    with pytest.raises(OutputError, match="Read-only"):
+        write_whole(tmp_path / "a", b"")
+
+
 @pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
 def test_a_failure_leaves_no_file(tmp_path, failure):
     with pytest.raises(failure), whole_file(tmp_path / "a.json") as part:

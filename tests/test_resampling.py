@@ -81,6 +81,13 @@ def test_gaps_stay(rate):
     assert found.readings[-1, 0, 0] == 2.0  # a stretch of one sample
 
 
+def test_a_module_without_samples_stays():
+    empty = Tactile(SENSOR, np.empty(0), np.empty((0, 1, 3)))
+    one = made([1.0, 2.0], [0.0, 0.01]).modules["thumb"]
+    found = resample(Recording("made", {"thumb": one, "index": empty}), 150.0)
+    assert found.modules["index"].n_samples == 0
+
+
 @pytest.mark.parametrize(("source", "rate"), [*RATES, (100, 65), (150, 40)])
 @pytest.mark.parametrize("n", [2, 57, 58, 59, 200])
 def test_labels_stay_up_to_the_last_sample(source, rate, n):

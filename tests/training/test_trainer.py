@@ -241,6 +241,12 @@ def test_a_finger_of_one_recording_is_trained_but_not_evaluated(grasps):
     assert set(by_name(trained.cross_validation)["grasp-22"].fingers) == {"thumb"}
 
 
+def test_a_recording_whose_finger_no_other_recording_has(grasps):
+    given = [*grasps[:3], tiny_recording(23, fingers=("ring",))]
+    trained = train(given, SETTING, warn=lambda _: None)
+    assert by_name(trained.cross_validation)["grasp-23"].fingers == {}
+
+
 def test_a_recording_without_labels_is_not_evaluated(grasps):
     bare = tiny_recording(24, fingers=("palm/1",), states=[None] * 4)
     trained = train([*grasps[:3], bare], SETTING)
