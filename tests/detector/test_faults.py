@@ -594,7 +594,7 @@ def ailing(draw, n=700):
     noise=st.sampled_from([None, 5.0, 60.0]),
     cuts=st.lists(st.integers(1, 699), max_size=3),
 )
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_equals_the_naive_detector_live_and_in_any_chunks(sick, tare, noise, cuts):
     which, values, times, ignore = sick
     hand_model = Model(fingers={ANY_FINGER: finger_model(contact_noise=noise)}, window=6, tare=tare)
