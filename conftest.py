@@ -65,12 +65,6 @@ def data_folder():
     return folder
 
 
-@pytest.fixture(scope="session")
-def collected(pytestconfig):
-    """What this run collected, before any selection: file of each test, whether it is quick."""
-    return pytestconfig.stash[COLLECTED]
-
-
 @pytest.fixture
 def short_grasps(monkeypatch):
     """Grasps of the twin that last a few seconds."""
@@ -129,10 +123,6 @@ def visit(browser, noted):
     assert complaints == []
 
 
-COLLECTED = pytest.StashKey()
-"""Key of what was collected: file of each test, and whether it is quick."""
-
-
 def pytest_configure(config):
     config.addinivalue_line("markers", "slow: a test that `-m quick` leaves out")
     config.addinivalue_line("markers", "quick: every test that is not slow; set by `conftest.py`")
@@ -148,14 +138,11 @@ def pytest_ignore_collect(collection_path, config):
 
 
 @pytest.hookimpl(tryfirst=True)  # before tests are selected by their marks
-def pytest_collection_modifyitems(config, items):
+def pytest_collection_modifyitems(items):
     for item in items:
         fixtures = SLOW_FIXTURES.intersection(getattr(item, "fixturenames", ()))
         if not (fixtures or is_slow(item.path) or item.get_closest_marker("slow")):
             item.add_marker(pytest.mark.quick)
-    config.stash[COLLECTED] = [
-        (item.nodeid.partition("::")[0], "quick" in item.keywords) for item in items
-    ]
 
 
 @pytest.hookimpl(wrapper=True)

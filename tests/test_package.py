@@ -16,31 +16,19 @@ PUBLIC = [
     *("Model", "Detector", "StreamDetector", "detect", "export"),
     *("ContactEstimate", "ContactEvent", "ContactState", "HandEstimate"),
     *("Cause", "Fault", "Reason"),
-    *(
-        "Setting",
-        "StabilityClassifier",
-        "teach",
-        "train",
-        "calibrate",
-        "evaluate",
-        "event_metrics",
-        "sample_metrics",
-    ),
+    *("Setting", "StabilityClassifier", "teach", "train", "calibrate"),
+    *("evaluate", "event_metrics", "sample_metrics"),
     *("EngineError", "HoldfastError", "MissingExtra", "ModelError", "OutputError"),
     *("RecordingError", "SourceError", "StreamError", "TrainingError"),
     *("Arrival", "Source", "open_source"),
 ]
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_public_name(name):
-    assert getattr(holdfast, name) is not None
-    assert name in holdfast.__all__
-    assert name in dir(holdfast)
-
-
-def test_there_is_no_other_public_name():
+def test_public_names_and_no_others():
     assert sorted([*PUBLIC, "__version__"]) == holdfast.__all__
+    for name in PUBLIC:
+        assert getattr(holdfast, name) is not None
+        assert name in dir(holdfast)
 
 
 def test_the_order_of_fields_is_fixed():
@@ -57,7 +45,7 @@ def test_version_is_that_of_the_distribution():
 
 
 def test_other_names_are_refused():
-    with pytest.raises(AttributeError, match=r"^module 'holdfast' has no attribute 'grasp'$"):
+    with pytest.raises(AttributeError, match="'grasp'"):
         _ = holdfast.grasp
 
 

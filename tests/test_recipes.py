@@ -68,15 +68,15 @@ class Copy:
         ended = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
         assert ended.returncode == 0, ended.stderr
 
-    def run(self, *arguments, exit_code=0):
-        """Run Python with the copy, and return its output, or its errors if it is to fail."""
+    def run(self, *arguments):
+        """Run Python with the copy, and return its output."""
         environment = {**os.environ, "PYTHONPATH": str(self.folder)}
         command = [sys.executable, *map(str, arguments)]
         ended = subprocess.run(
             command, capture_output=True, text=True, env=environment, check=False, timeout=1500
         )
-        assert ended.returncode == exit_code, ended.stderr
-        return ended.stderr if exit_code else ended.stdout
+        assert ended.returncode == 0, ended.stderr
+        return ended.stdout
 
     def _check(self, name):
         assert name in self._named, f"the recipe does not name {name}, but {self._named}"
@@ -85,36 +85,6 @@ class Copy:
 @pytest.fixture
 def copy_of(tmp_path):
     return lambda title: Copy(tmp_path, title)
-
-
-MIDDLE = '''
-"""Cut of one feature in the middle between the means of the classes."""
-
-from dataclasses import dataclass, field
-
-from holdfast.classifiers.fitting import Fitted, check_classes, sigmoid, standardise
-from holdfast.classifiers.linear import Linear
-
-
-@dataclass(frozen=True)
-class Middle:
-    """The direction is that of the difference of the means."""
-
-    name: str = "middle"
-    reference: dict = field(default_factory=dict)
-
-    def suggest(self, trial):
-        """Return no parameters."""
-        return {}
-
-    def fit(self, samples, parameters, seed):
-        """Fit the means."""
-        check_classes(samples)
-        mean, scale, rows = standardise(samples.features)
-        high, low = rows[samples.positive].mean(axis=0), rows[~samples.positive].mean(axis=0)
-        slope, offset = sigmoid(rows @ (high - low), samples.positive)
-        return Fitted(Linear.of(mean, scale, high - low, 0.0, slope=slope, offset=offset))
-'''
 
 
 def labelled_recordings(folder):
@@ -131,29 +101,6 @@ def labelled_recordings(folder):
         labelled = recording.with_labels(dict.fromkeys(recording.modules, labels))
         save_recording(labelled, folder / f"grasp-{seed}.mcap")
     return folder
-
-
-def test_add_a_classifier(copy_of, tmp_path):
-    copy = copy_of("Add a classifier")
-    copy.add("holdfast/classifiers/middle.py", "name", MIDDLE)
-    copy.change(
-        "holdfast/classifiers/__init__.py",
-        ("from holdfast.classifiers.svm", "from holdfast.classifiers.middle import Middle\n"
-         "from holdfast.classifiers.svm"),
-        ('"svm": LinearSVM()}', '"svm": LinearSVM(), "middle": Middle()}'),
-    )  # fmt: skip
-    data, model = labelled_recordings(tmp_path / "data"), tmp_path / "model.json"
-    copy.run(
-        *VERB, "train", data, "-o", model, "--classifier", "middle", "--trials", "0",
-        "--shared", "--jobs", "1",
-    )  # fmt: skip
-    written = json.loads(model.read_text())["fingers"]["*"]["heads"][0]
-    assert written["rule"]["type"] == "linear"
-    program = (
-        "import sys; from holdfast import Model, detect, load_recording\n"
-        "print(len(detect(Model.load(sys.argv[1]), load_recording(sys.argv[2])).times))"
-    )
-    assert int(copy.run("-c", program, model, data / "grasp-0.mcap")) > 100
 
 
 PAD = """def _pad() -> Sensor:
@@ -210,58 +157,32 @@ def test_add_a_grip_law(copy_of):
     assert copy.run("-c", program) == "2.0\n"
 
 
-C_FEATURES = (
-    "    const hf_real *const newest = hf_history(f, 0);\n",
-    """    if (kind == HOLDFAST_SHEAR) { /* |F_tip - (F_tip . z) z| of the newest sample */
+HISTORY = "    const hf_real *const newest = hf_history(f, 0);\n"
+SHEAR = """    if (kind == HOLDFAST_SHEAR) { /* |F_tip - (F_tip . z) z| of the newest sample */
         return hf_sqrt(newest[1] * newest[1] + newest[2] * newest[2]);
     }
-    if (kind == HOLDFAST_RANGE) { /* max F_a - min F_a over the window */
-        hf_real least = newest[0], most = newest[0];
-        for (size_t back = 1; back < window; ++back) {
-            least = hf_min(least, hf_history(f, back)[0]);
-            most = hf_max(most, hf_history(f, back)[0]);
-        }
-        return most - least;
-    }
-""",
-)
+"""
 
 CHECK_FEATURES = """
 import sys
 from dataclasses import replace
 import numpy as np
-from holdfast import Detector, Model, detect, fingertip_force, load_recording
+from holdfast import Model, fingertip_force, load_recording
 from holdfast.features.stream import extract
 
 model, recording = Model.load(sys.argv[1]), load_recording(sys.argv[2])
-model.save(sys.argv[3])
-assert Model.load(sys.argv[3]).digest == model.digest
-names = [str(spec) for spec in model.finger("thumb").features]
-assert names == ["F_a", "shear", "range[14]"], names
+assert [str(spec) for spec in model.finger("thumb").features] == ["F_a", "shear"]
 
 # The values of the kernel are those of NumPy, of a skin from which no field of the earth is taken.
 plan = model.plan(model.fingers_of({n: m.sensor for n, m in recording.modules.items()}), 150.0)
 sensors = {n: replace(sensor, magnetic=False) for n, sensor in plan.sensors.items()}
-plan = replace(plan, sensors=sensors)
-features = extract(plan, recording)
+features = extract(replace(plan, sensors=sensors), recording)
 for finger, module in recording.modules.items():
     force = fingertip_force(module.readings, module.sensor, model.tare, module.times)
-    amplitude = np.linalg.norm(force, axis=1)
-    windows = np.lib.stride_tricks.sliding_window_view(amplitude, 14)
-    shear, extent = np.hypot(force[13:, 0], force[13:, 1]), np.ptp(windows, axis=1)
-    rows = features[finger].features[13:]
-    known = np.isfinite(rows).all(axis=1)
-    assert known.sum() > 100
-    np.testing.assert_allclose(rows[known, 1], shear[known], atol=1e-9)
-    np.testing.assert_allclose(rows[known, 2], extent[known], atol=1e-9)
-
-# A detector that is fed sample by sample gives the same bits as the whole recording.
-batch, detector = detect(model, recording), Detector(model, rate=recording.rate)
-for k, time in enumerate(recording.modules["thumb"].times):
-    live = detector.update({n: m.readings[k] for n, m in recording.modules.items()}, time)
-    for finger, trace in batch.fingers.items():
-        assert repr(live.fingers[finger]) == repr(trace.estimate(k)), (finger, k)
-print(np.isfinite(batch.fingers["thumb"].stable_probability).sum())
+    shear = features[finger].features[:, 1]
+    known = np.isfinite(shear)
+    np.testing.assert_allclose(shear[known], np.hypot(*force.T[:2])[known], atol=1e-9)
+    print(known.sum())
 """
 
 
@@ -271,15 +192,13 @@ def test_add_a_feature(copy_of, tmp_path):
         "holdfast/features/specs.py",
         ('        # The change of F_tip, and its',
          '        FeatureKind("shear", "force", "sample"),\n'
-         '        FeatureKind("range", "force", "window"),\n'
          '        # The change of F_tip, and its'),
     )  # fmt: skip
     copy.change(
         "holdfast/kernel/kernel.h",
-        ("HOLDFAST_FIRST_RELATIVE = 8,",
-         "HOLDFAST_SHEAR = 8, HOLDFAST_RANGE = 9, HOLDFAST_FIRST_RELATIVE = 10,"),
-    )  # fmt: skip
-    copy.change("holdfast/kernel/stream.c", (C_FEATURES[0], "".join(C_FEATURES)))
+        ("HOLDFAST_FIRST_RELATIVE = 8,", "HOLDFAST_SHEAR = 8, HOLDFAST_FIRST_RELATIVE = 9,"),
+    )
+    copy.change("holdfast/kernel/stream.c", (HISTORY, HISTORY + SHEAR))
     copy.change(
         "holdfast/kernel/tables.c",
         ("feature->kind >= HOLDFAST_M && !has_lag;",
@@ -288,12 +207,10 @@ def test_add_a_feature(copy_of, tmp_path):
     copy.build()
     data, model = labelled_recordings(tmp_path / "data"), tmp_path / "model.json"
     copy.run(
-        *VERB, "train", data, "-o", model, "--features", "F_a,shear,range", "--trials", "0",
-        "--jobs", "1",
-    )  # fmt: skip
-    recording, again = data / "grasp-0.mcap", tmp_path / "again.json"
-    assert int(copy.run("-c", CHECK_FEATURES, model, recording, again)) > 100
-    assert again.read_bytes() == model.read_bytes()
+        *VERB, "train", data, "-o", model, "--features", "F_a,shear", "--trials", "0", "--jobs", "1"
+    )
+    known = copy.run("-c", CHECK_FEATURES, model, data / "grasp-0.mcap")
+    assert min(map(int, known.split())) > 100
 
 
 IMPORTER = '''
@@ -305,7 +222,6 @@ from pathlib import Path
 
 import numpy as np
 
-from holdfast.errors import RecordingError
 from holdfast.files import read_input
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -323,13 +239,10 @@ def parts(path: Path) -> list[Path]:
 
 def read(path: Path) -> Iterator[Recording]:
     """Read the recording of a file."""
-    try:
-        rows = [json.loads(line) for line in read_input(path, 1 << 20).splitlines()]
-        times = np.array([row["t"] for row in rows], dtype=np.float64)
-        readings = np.array([row["taxels"] for row in rows])
-        yield Recording(path.stem, {"index": Tactile(sensor("uskin-4x4"), times, readings)})
-    except (KeyError, TypeError, ValueError) as cause:
-        raise RecordingError(f"{path} is no file of taps: {cause}") from cause
+    rows = [json.loads(line) for line in read_input(path, 1 << 20).splitlines()]
+    times = np.array([row["t"] for row in rows], dtype=np.float64)
+    readings = np.array([row["taxels"] for row in rows])
+    yield Recording(path.stem, {"index": Tactile(sensor("uskin-4x4"), times, readings)})
 '''
 
 
@@ -347,9 +260,6 @@ def test_add_a_file_format(copy_of, tmp_path):
     module = load_recording(out / "tap.mcap").modules["index"]
     assert module.times.tolist() == [row["t"] for row in rows]
     assert module.readings.tolist() == [row["taxels"] for row in rows]
-    file.write_text('{"t": 1}')
-    broken = copy.run(*VERB, "import", file, out, "--format", "finger-taps", exit_code=2)
-    assert broken == f"holdfast: {file} is no file of taps: 'taxels'\n"
 
 
 def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):

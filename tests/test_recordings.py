@@ -40,30 +40,23 @@ def recording(**fields):
 class TestLabel:
     @pytest.mark.parametrize("span", [(1, 1), (2, 1), (0, float("nan")), (0, float("inf"))])
     def test_ends_after_its_start(self, span):
-        with pytest.raises(ValueError) as refused:
+        with pytest.raises(ValueError, match="ends after its start"):
             Label(*span, ContactState.STABLE)
-        assert str(refused.value) == (
-            f"a label ends after its start; [{span[0]}, {span[1]}) s given"
-        )
 
     @pytest.mark.parametrize("state", [ContactState.UNKNOWN, "UNKNOWN"])
     def test_unknown_is_no_label(self, state):
-        with pytest.raises(
-            ValueError, match=r"^a label is STABLE, UNSTABLE or NO_CONTACT; UNKNOWN given$"
-        ):
+        with pytest.raises(ValueError, match="UNKNOWN"):
             Label(0, 1, state)
 
     def test_refuses_unknown_states_and_causes(self):
-        with pytest.raises(ValueError, match="'wobbly' is not a valid ContactState"):
+        with pytest.raises(ValueError, match="'wobbly'"):
             Label(0, 1, "wobbly")
-        with pytest.raises(ValueError, match="'wind' is not a valid Cause"):
+        with pytest.raises(ValueError, match="'wind'"):
             Label(0, 1, ContactState.UNSTABLE, "wind")
 
     @pytest.mark.parametrize("confidence", [-0.1, 1.1, float("nan")])
     def test_confidence(self, confidence):
-        with pytest.raises(
-            ValueError, match=f"^confidence from 0 to 1 expected, {confidence} given$"
-        ):
+        with pytest.raises(ValueError, match="confidence"):
             Label(0, 1, ContactState.STABLE, confidence=confidence)
 
     def test_plain_words_become_members(self):
@@ -76,61 +69,33 @@ class TestTactile:
     @pytest.mark.parametrize(
         ("fields", "message"),
         [
-            ({"times": np.zeros((10, 1))}, "times of shape (n,) expected, (10, 1) given"),
-            (
-                {"readings": np.zeros((10, 15))},
-                "readings of shape (n, 5, 3) expected for anyskin, (10, 15) given",
-            ),
-            (
-                {"readings": np.zeros((10, 5, 2))},
-                "readings of shape (n, 5, 3) expected for anyskin, (10, 5, 2) given",
-            ),
-            ({"readings": np.zeros((10, 4, 3))}, "4 taxels given, 5 expected (anyskin)"),
-            ({"readings": np.zeros((9, 5, 3))}, "9 samples given with 10 times"),
-            ({"readings": np.zeros((10, 5, 3), bool)}, "readings must be numbers; bool given"),
-            (
-                {"readings": np.zeros((10, 5, 3), complex)},
-                "readings must be numbers; complex128 given",
-            ),
-            (
-                {"times": np.array([0, 1, 2, 3, np.nan, 5, 6, 7, 8, 9])},
-                "a time is not finite; seconds expected",
-            ),
-            (
-                {"times": np.array([0, 1, 2, 3, 3, 5, 6, 7, 8, 9])},
-                "times stand still at sample 4: 3 s after 3 s; strictly increasing times expected",
-            ),
-            (
-                {"times": 1.7e9 + np.array([0, 1, 2, 1.5, 4, 5, 6, 7, 8, 9])},
-                "times go back at sample 3: 1700000001.5 s after 1700000002 s; "
-                "strictly increasing times expected",
-            ),
+            ({"times": np.zeros((10, 1))}, "times of shape"),
+            ({"readings": np.zeros((10, 15))}, "anyskin"),
+            ({"readings": np.zeros((10, 5, 2))}, "anyskin"),
+            ({"readings": np.zeros((10, 4, 3))}, "4 taxels"),
+            ({"readings": np.zeros((9, 5, 3))}, "9 samples"),
+            ({"readings": np.zeros((10, 5, 3), bool)}, "bool"),
+            ({"readings": np.zeros((10, 5, 3), complex)}, "complex128"),
+            ({"times": np.array([0, 1, 2, 3, np.nan, 5, 6, 7, 8, 9])}, "not finite"),
+            ({"times": np.array([0, 1, 2, 3, 3, 5, 6, 7, 8, 9])}, "sample 4"),
+            ({"times": 1.7e9 + np.array([0, 1, 2, 1.5, 4, 5, 6, 7, 8, 9])}, "sample 3"),
         ],
     )
     def test_refuses(self, fields, message):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match=message):
             tactile(**fields)
-        assert str(refused.value) == message
 
     def test_labels_within_the_recording(self):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="outside"):
             tactile(labels=(Label(0, 1, ContactState.STABLE),))
-        assert str(refused.value) == (
-            "label [0, 1) s lies outside the recording, which runs from 0 to 0.105 s"
-        )
-
-    def test_labels_before_the_recording(self):
-        with pytest.raises(RecordingError, match="outside the recording"):
-            tactile(labels=(Label(-0.01, 0.05, ContactState.STABLE),))
 
     def test_labels_do_not_overlap(self):
         labels = (Label(0, 0.05, ContactState.STABLE), Label(0.04, 0.06, ContactState.UNSTABLE))
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="overlap"):
             tactile(labels=labels)
-        assert str(refused.value) == "labels overlap: [0, 0.05) s and [0.04, 0.06) s"
 
     def test_labels_need_samples(self):
-        with pytest.raises(RecordingError, match=r"^1 labels given for a module without samples$"):
+        with pytest.raises(RecordingError, match="without samples"):
             tactile(n=0, labels=(Label(0, 1, ContactState.STABLE),))
 
     def test_labels_are_put_in_order(self):
@@ -224,16 +189,15 @@ class TestLabelsFromSamples:
         )
 
     def test_as_many_states_as_times(self):
-        with pytest.raises(ValueError, match=r"^1 states given for 2 times$"):
+        with pytest.raises(ValueError, match="1 states"):
             labels_from_samples(np.arange(2.0), [None], period=1)
 
 
 class TestRecording:
     @pytest.mark.parametrize("modules", [{}, {"finger1": tactile(n=0)}])
     def test_needs_a_sample(self, modules):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="'one' has no samples"):
             Recording("one", modules)
-        assert str(refused.value) == "recording 'one' has no samples; at least one expected"
 
     def test_start_end_and_duration_are_over_all_modules(self):
         late = tactile(times=0.05 + np.arange(10) / 100)
@@ -248,9 +212,8 @@ class TestRecording:
             recording().metadata["object"] = "can"
 
     def test_labels_for_a_missing_module(self):
-        with pytest.raises(RecordingError) as refused:
+        with pytest.raises(RecordingError, match="thumb"):
             recording().with_labels({"thumb": ()})
-        assert str(refused.value) == "labels for thumb given; recording 'one' has finger1"
 
     def test_with_labels_replaces_all(self):
         label = Label(0, 0.05, ContactState.STABLE)
@@ -308,7 +271,7 @@ class TestTruth:
         "fields", [{"hand": {"phase": np.ones(2)}}, {"fingers": {"thumb": {"phase": np.ones(2)}}}]
     )
     def test_as_many_rows_as_times(self, fields):
-        with pytest.raises(RecordingError, match=r"^truth 'phase' has 2 rows for 3 times$"):
+        with pytest.raises(RecordingError, match="'phase'"):
             Truth(np.arange(3.0), **fields)
 
     def test_a_slice_has_the_rows_of_its_samples(self):
@@ -349,11 +312,8 @@ def test_two_equal_modules():
     whole = synthetic_recording("a", 0, ("thumb", "index"))
     whole.check_modules_differ()
     thumb = whole.modules["thumb"]
-    with pytest.raises(RecordingError) as error:
+    with pytest.raises(RecordingError, match="thumb and index"):
         replace(whole, modules=dict.fromkeys(("thumb", "index"), thumb)).check_modules_differ()
-    assert str(error.value) == (
-        "recording 'a': thumb and index have the same readings; those of different sensors expected"
-    )
     still = replace(thumb, readings=np.zeros_like(thumb.readings))
     replace(whole, modules=dict.fromkeys(("thumb", "index"), still)).check_modules_differ()
 

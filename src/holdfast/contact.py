@@ -421,24 +421,6 @@ def enough_contacts(
     return np.asarray(n_contacts >= min(MIN_HOLDING_FINGERS, n_model_fingers))
 
 
-def is_held(time: float, last_unstable: float, hold: float, period: float) -> bool:
-    """Return whether UNSTABLE is still held at a time, for the hold time of a model.
-
-    Half a sample period of tolerance keeps the rounding of times from moving the end.
-
-    Args:
-        time: of a sample [s].
-        last_unstable: when the finger last was unstable [s]; NaN if it never was.
-        hold: hold time [s].
-        period: of the samples [s].
-
-    Example:
-        >>> [is_held(k / 100, 0.0, hold=0.03, period=0.01) for k in range(5)]
-        [True, True, True, False, False]
-    """
-    return time - last_unstable + 0.5 * period < hold
-
-
 @cache
 def faults_of(mask: int) -> tuple[Fault, ...]:
     """Return the faults whose bits are set in a mask, in the order of `Fault`."""

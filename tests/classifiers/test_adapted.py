@@ -117,13 +117,6 @@ def test_a_prior_that_is_upside_down_loses_its_slope():
     assert found.slope == pytest.approx(1e-6)
 
 
-def test_the_log_odds_of_a_prior_are_those_of_its_probability():
-    scaled = (GIVEN.features - np.array(UNLIKE.mean)) / np.array(UNLIKE.scale)
-    odds = np.column_stack([np.ones(len(scaled)), scaled]) @ odds_of(UNLIKE)
-    p = UNLIKE.probability(GIVEN.features)
-    assert odds == pytest.approx(np.log(p / (1 - p)), abs=1e-6)
-
-
 @pytest.mark.parametrize("prior", [PRIOR, UNLIKE])
 def test_with_a_large_c_it_equals_scikit_learn(prior):
     scaled = (GIVEN.features - np.array(prior.mean)) / np.array(prior.scale)
@@ -150,11 +143,6 @@ def test_probabilities_are_of_the_base_rate_and_the_threshold_stays():
     assert found == Fitted(adapted(1.0, given, UNLIKE), 0.2)
 
 
-def test_it_is_deterministic():
-    parameters = {"change": WEIGHTS, "C": 0.1}
-    assert Adapted(PRIOR).fit(GIVEN, parameters, 1) == Adapted(PRIOR).fit(GIVEN, parameters, 2)
-
-
 def test_few_samples_help_a_prior_that_is_nearly_right():
     """Forty samples, and a prior whose cut is off."""
     world = samples(20_000, seed=7)
@@ -172,19 +160,13 @@ def test_few_samples_help_a_prior_that_is_nearly_right():
 @pytest.mark.parametrize("stable", [True, False])
 def test_one_class_is_refused(stable):
     given = GIVEN._replace(positive=np.full(600, stable))
-    n = 600 if stable else 0
-    with pytest.raises(TrainingError) as raised:
+    with pytest.raises(TrainingError, match="labelled"):
         adapted(1.0, given)
-    assert str(raised.value) == (
-        f"{n} samples labelled stable and {600 - n} labelled not stable given; both classes are "
-        "needed to train"
-    )
 
 
 def test_another_number_of_features_is_refused():
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="3 expected"):
         adapted(1.0, GIVEN._replace(features=GIVEN.features[:, :2]))
-    assert str(raised.value) == "2 features given, 3 expected to adapt"
 
 
 def test_every_prior_has_a_name_of_its_own():
@@ -196,21 +178,5 @@ def test_every_prior_has_a_name_of_its_own():
 
 
 def test_an_unknown_change_is_refused():
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="'all'"):
         adapted(1.0, change="all")
-    assert str(raised.value) == "unknown change 'all'; there are none, calibration, weights"
-
-
-def test_the_search_covers_the_reference():
-    class Trial:
-        def suggest_categorical(self, name, choices):
-            assert name == "change"
-            assert Adapted(PRIOR).reference["change"] in choices
-            return "weights"
-
-        def suggest_float(self, name, low, high, *, log):
-            assert (name, log) == ("C", True)
-            assert low <= Adapted(PRIOR).reference["C"] <= high
-            return low
-
-    assert Adapted(PRIOR).suggest(Trial()) == {"change": "weights", "C": 1e-6}

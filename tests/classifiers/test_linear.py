@@ -61,54 +61,39 @@ def test_features_of_any_type(kind):
 @pytest.mark.parametrize("of", ["probability", "decision"])
 def test_refuses_other_shapes(shape, of):
     rule = Linear((0.0, 1.0), (1.0, 2.0), ((1.0, -1.0),), (0.2,))
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=r"\(n, 2\)"):
         getattr(rule, of)(np.zeros(shape))
-    assert str(raised.value) == f"features of shape (n, 2) expected, {shape} given"
 
 
 GOOD = {"mean": (0.0,), "scale": (1.0,), "weights": ((1.0,),), "intercepts": (0.0,)}
-NOT_FINITE = "a number of the weights is not finite, or a scale is too small"
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"mean": (0.0, 1.0)},
-         "means, scales and rows of weights and squares of 2, 1, 1 features given; the same "
-         "number of each expected"),
-        ({"weights": ((1.0,), (1.0, 2.0)), "intercepts": (0.0, 0.0)},
-         "means, scales and rows of weights and squares of 1, 1, 1, 2 features given; the same "
-         "number of each expected"),
-        ({"squares": ((1.0, 2.0),)},
-         "means, scales and rows of weights and squares of 1, 1, 1, 2 features given; the same "
-         "number of each expected"),
-        ({"intercepts": (0.0, 0.0)},
-         "1 rows of weights, 2 intercepts and 0 rows of squares given; one of each for every "
-         "output expected"),
-        ({"squares": ((1.0,), (2.0,))},
-         "1 rows of weights, 1 intercepts and 2 rows of squares given; one of each for every "
-         "output expected"),
-        ({"weights": (), "intercepts": ()},
-         "0 rows of weights, 0 intercepts and 0 rows of squares given; one of each for every "
-         "output expected"),
-        ({"mean": (np.nan,)}, NOT_FINITE),
-        ({"weights": ((np.inf,),)}, NOT_FINITE),
-        ({"intercepts": (np.nan,)}, NOT_FINITE),
-        ({"squares": ((np.nan,),)}, NOT_FINITE),
-        ({"squares": ((1e308,),), "slope": 1e3}, NOT_FINITE),
-        ({"squares": ((0.0,),), "scale": (1e-320,), "weights": ((0.0,),)}, NOT_FINITE),
-        ({"offset": -np.inf}, NOT_FINITE),
-        ({"slope": np.nan}, NOT_FINITE),
-        ({"slope": 0.0}, "scales and slope above 0 expected"),
-        ({"scale": (0.0,)}, "scales and slope above 0 expected"),
-        ({"scale": (-1.0,)}, "scales and slope above 0 expected"),
-        ({"scale": (1e-300,), "weights": ((1e300,),)}, NOT_FINITE),
+        ({"mean": (0.0, 1.0)}, "2, 1, 1 features"),
+        ({"weights": ((1.0,), (1.0, 2.0)), "intercepts": (0.0, 0.0)}, "1, 1, 1, 2 features"),
+        ({"squares": ((1.0, 2.0),)}, "1, 1, 1, 2 features"),
+        ({"intercepts": (0.0, 0.0)}, "2 intercepts"),
+        ({"squares": ((1.0,), (2.0,))}, "2 rows of squares"),
+        ({"weights": (), "intercepts": ()}, "0 rows of weights"),
+        ({"mean": (np.nan,)}, "not finite"),
+        ({"weights": ((np.inf,),)}, "not finite"),
+        ({"intercepts": (np.nan,)}, "not finite"),
+        ({"squares": ((np.nan,),)}, "not finite"),
+        ({"squares": ((1e308,),), "slope": 1e3}, "not finite"),
+        ({"squares": ((0.0,),), "scale": (1e-320,), "weights": ((0.0,),)}, "not finite"),
+        ({"offset": -np.inf}, "not finite"),
+        ({"slope": np.nan}, "not finite"),
+        ({"slope": 0.0}, "slope"),
+        ({"scale": (0.0,)}, "scale"),
+        ({"scale": (-1.0,)}, "scale"),
+        ({"scale": (1e-300,), "weights": ((1e300,),)}, "not finite"),
     ],
-)  # fmt: skip
+)
 def test_refusals(change, message):
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match=message):
         Linear(**(GOOD | change))
-    assert str(raised.value) == message
 
 
 @given(classifiers(4))

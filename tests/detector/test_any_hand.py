@@ -67,8 +67,7 @@ def test_axes_without_values_are_unknown(model, axes):
 
 @pytest.mark.parametrize("rate", [5, 20, 1100])
 def test_rates_outside_the_limits_are_refused(model, rate):
-    expected = f"{rate} Hz given, the model expects 30 to 1000 Hz; resample the recording, or set"
-    with pytest.raises(ModelError, match=expected):
+    with pytest.raises(ModelError, match=f"{rate} Hz given, the model expects 30 to 1000 Hz"):
         states(model, grasp(rate=rate))
 
 

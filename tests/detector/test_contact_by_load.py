@@ -9,7 +9,6 @@ from holdfast.detector import detect
 from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.training.replay import ThresholdReplay
 
 RATE = 100.0
 SENSOR = sensor("papillarray")
@@ -122,18 +121,6 @@ def test_a_force_that_leaves_keeps_its_probability():
     ]
     leaving = trace.state == UNSTABLE
     assert leaving.any() and (trace.stable_probability[leaving] > 0).all()
-
-
-@pytest.mark.parametrize("threshold", [0.05, 0.4, 0.9])
-def test_a_replay_of_the_threshold_has_the_states_of_the_detector(threshold):
-    model = Model.load("builtin:any")
-    recording = recording_of(
-        steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (1, 0), (1, 0.06), (1, 0.06))
-    )
-    replay = ThresholdReplay.of(model, recording)
-    trace = detect(model.with_threshold("stable", threshold), recording).fingers["a"]
-    assert {NO_CONTACT, UNSTABLE} <= set(trace.state.tolist())
-    np.testing.assert_array_equal(replay.states(replay.raw.fingers["a"], threshold), trace.state)
 
 
 @pytest.mark.parametrize(("share", "noise"), [(0.4, 1e-3), (1.8, 1e-3), (0.3, 8e-3)])

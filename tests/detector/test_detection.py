@@ -206,37 +206,31 @@ def test_a_shift_of_time_changes_nothing(start):
 class TestSlip:
     """The slip rule: live equals batch, and both equal the rule over arrays."""
 
-    @pytest.mark.parametrize("slips", [("thumb", "index"), ("thumb",), ()])
+    @pytest.mark.parametrize(
+        "options",
+        [
+            {"slips": ("thumb", "index")},
+            {"slips": ("thumb",)},
+            {"slips": ()},
+            {"slips": ("index",), "own": SLIP_OWN},
+            {"slips": ("index",), "own": TAXELS},
+            {"slips": ("thumb", "index"), "own": TAXELS, "speeds": ("thumb", "index")},
+            {"slips": ("thumb", "index"), "own": TAXELS, "speeds": ("thumb",)},
+        ],
+        ids=["both", "one", "none", "force", "taxels", "speeds", "a speed"],
+    )
     @pytest.mark.parametrize("clock", CLOCKS)
-    def test_detect_equals_update(self, clock, slips):
+    def test_detect_equals_update(self, clock, options):
         made = recording(**CLOCKS[clock])
-        hand_model = model(features=RICH, threshold=20.0, slips=slips)
+        hand_model = model(features=RICH, threshold=20.0, **options)
         found = detect(hand_model, made)
         assert_same(found, list(feed(Detector(hand_model), made)))
         for name, trace in found.fingers.items():
-            assert (trace.slip_probability is None) == (name not in slips)
-
-    @pytest.mark.parametrize("own", [SLIP_OWN, TAXELS], ids=["force", "taxels"])
-    @pytest.mark.parametrize("clock", CLOCKS)
-    def test_detect_equals_update_with_features_of_the_rule(self, clock, own):
-        made = recording(**CLOCKS[clock])
-        hand_model = model(features=RICH, threshold=20.0, slips=("index",), own=own)
-        found = detect(hand_model, made)
-        assert_same(found, list(feed(Detector(hand_model), made)))
-        probability = found.fingers["index"].slip_probability
-        assert clock != "one clock" or np.nanstd(probability) > 0.01
-
-    @pytest.mark.parametrize("speeds", [("thumb", "index"), ("thumb",)])
-    @pytest.mark.parametrize("clock", CLOCKS)
-    def test_detect_equals_update_with_a_speed(self, clock, speeds):
-        made = recording(**CLOCKS[clock])
-        slips = ("thumb", "index")
-        hand_model = model(features=RICH, threshold=20.0, slips=slips, own=TAXELS, speeds=speeds)
-        found = detect(hand_model, made)
-        assert_same(found, list(feed(Detector(hand_model), made)))
-        for name, trace in found.fingers.items():
+            assert (trace.slip_probability is None) == (name not in options["slips"])
             assert (trace.slip_speed is None) == (trace.slip_distance is None)
-            assert (trace.slip_speed is None) == (name not in speeds)
+            assert (trace.slip_speed is None) == (name not in options.get("speeds", ()))
+        if clock == "one clock" and "own" in options:
+            assert np.nanstd(found.fingers["index"].slip_probability) > 0.01
 
     @pytest.mark.parametrize(("threshold", "is_raised"), [(0.999, True), (1.0, False)])
     def test_a_threshold_of_1_is_never_reached(self, threshold, is_raised):
@@ -382,47 +376,32 @@ class TestIntervalTare:
         assert np.array_equal(found.fingers["index"].force, expected)
 
     def test_is_refused_live(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match=r"0.5:0.9"):
             Detector(model(tare="0.5:0.9"))
-        assert str(raised.value) == (
-            "the model's tare is the interval 0.5:0.9 s of a recording; "
-            "seconds, 'first' or 'none' expected where samples come one by one"
-        )
 
     def test_without_samples_is_refused(self):
-        with pytest.raises(ValueError) as raised:
+        with pytest.raises(ValueError, match=r"index of 'made'.* 7:9"):
             detect(model(tare="7:9"), recording(index=tactile(seed=2)))
-        assert str(raised.value) == (
-            "index of 'made', which runs from 0 to 1.99 s: tare 7:9: no finite sample in that time"
-        )
 
 
 class TestRefusals:
     def test_none_of_the_fingers(self):
-        with pytest.raises(ModelError) as raised:
+        with pytest.raises(ModelError, match="ring"):
             detect(model(), recording(ring=tactile()))
-        assert str(raised.value) == "the model is for thumb, index; ring given"
 
     def test_run_with_none_of_the_fingers(self):
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match="ring"):
             Detector(model()).run(recording(ring=tactile()))
-        assert str(raised.value) == (
-            "recording 'made' has samples of ring; the model is for thumb, index"
-        )
 
     def test_run_with_other_taxels(self):
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match=r"index: .*\(1, 3\)"):
             Detector(model()).run(recording(index=tactile(which=sensor(1, "small"))))
-        assert str(raised.value) == "index: a sample of shape (1, 3) given, (2, 3) expected (tiny)"
 
     def test_run_that_goes_back(self):
         detector = Detector(model())
         detector.run(recording(index=tactile(20, start=1.0)))
-        with pytest.raises(StreamError) as raised:
+        with pytest.raises(StreamError, match=r"1.1 s"):
             detector.run(recording(index=tactile(20, start=1.1)))
-        assert str(raised.value) == (
-            "time 1.1 s given after 1.19 s; finite, increasing times expected"
-        )
 
 
 def test_unstable_beside_a_high_probability_says_why():

@@ -526,15 +526,9 @@ class TestIgnore:
     @pytest.mark.parametrize(
         ("ignore", "message"),
         [
-            ({"ring": [0]}, "taxels of 'ring' to be ignored; the model is for thumb"),
-            (
-                {"thumb": [0, 6]},
-                "thumb: taxel index 6 to be ignored; it has the indices 0 to 5",
-            ),
-            (
-                {"thumb": [-1]},
-                "thumb: taxel index -1 to be ignored; it has the indices 0 to 5",
-            ),
+            ({"ring": [0]}, "'ring'"),
+            ({"thumb": [0, 6]}, "thumb: taxel index 6"),
+            ({"thumb": [-1]}, "thumb: taxel index -1"),
         ],
     )
     def test_refuses_unknown_fingers_and_taxels(self, ignore, message):
@@ -544,9 +538,8 @@ class TestIgnore:
             lambda: Detector(hand_model, ignore=ignore),
             lambda: Detector.for_recording(hand_model, made, ignore=ignore),
         ):
-            with pytest.raises(ValueError) as raised:
+            with pytest.raises(ValueError, match=message):
                 make()
-            assert str(raised.value) == message
 
 
 @st.composite
@@ -601,7 +594,7 @@ def ailing(draw, n=700):
     noise=st.sampled_from([None, 5.0, 60.0]),
     cuts=st.lists(st.integers(1, 699), max_size=3),
 )
-@settings(max_examples=15)
+@settings(max_examples=10)
 def test_equals_the_naive_detector_live_and_in_any_chunks(sick, tare, noise, cuts):
     which, values, times, ignore = sick
     hand_model = Model(fingers={ANY_FINGER: finger_model(contact_noise=noise)}, window=6, tare=tare)

@@ -101,7 +101,7 @@ def test_old_models_keep_their_bytes():
 
 @pytest.mark.parametrize("value", [-1.0, math.inf, math.nan])
 def test_a_wrong_rate_is_refused(value):
-    with pytest.raises(ModelError, match="a switching of at least 0 per second expected"):
+    with pytest.raises(ModelError, match="switching"):
         Debounce(switching=value)
 
 

@@ -4,13 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from holdfast.devices.sources import SCHEMES, open_source
+from holdfast.devices.sources import open_source
 from holdfast.devices.sources.replay import ReplaySource
-from holdfast.devices.uri import SOURCE_PLUGINS, is_uri, parse
-
-KNOWN = "there are " + ", ".join(
-    f"{name}:" for name in ("xela", "twin", "serial", *SOURCE_PLUGINS.names())
-)
+from holdfast.devices.uri import is_uri, parse
 
 
 def test_the_parts_of_a_uri():
@@ -40,52 +36,26 @@ def test_host_and_path(text, host, path):
     assert (address.host, address.path) == (host, path)
 
 
-@pytest.mark.parametrize("text", ["grasp.csv:", "udp://host", "http://host/a", "can", "", ":"])
-def test_unknown_schemes(text):
-    with pytest.raises(ValueError) as error:
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        *((text, repr(text)) for text in ("grasp.csv:", "udp://host", "http://host/a", "can", "")),
+        ("xela://[1:2", "no URI"),
+        ("twin:?seed=1&seed=2", "twice"),
+        ("twin:?object=can&loop", "'loop'"),
+        ("twin:?object=can#1", "after #"),
+    ],
+)
+def test_what_is_no_uri_of_a_source(text, named):
+    with pytest.raises(ValueError, match=named):
         parse(text)
-    assert str(error.value) == (
-        f"{text!r} is neither the path of a recording nor the URI of a source; {KNOWN}"
-    )
-
-
-def test_another_scheme_opens_nothing():
-    with pytest.raises(ValueError, match=r"^'udp://host' is neither the path of a recording nor"):
-        open_source("udp://host")
-
-
-def test_a_parameter_that_is_given_twice():
-    with pytest.raises(ValueError) as error:
-        parse("twin:?seed=1&seed=2")
-    assert str(error.value) == "twin:?seed=1&seed=2: a parameter is given twice"
-
-
-def test_an_invalid_uri():
-    with pytest.raises(ValueError) as error:
-        open_source("xela://[1:2")
-    assert str(error.value) == "xela://[1:2 is no URI: Invalid IPv6 URL"
-
-
-def test_a_parameter_without_a_value():
-    with pytest.raises(ValueError) as error:
-        parse("twin:?object=can&loop")
-    assert str(error.value) == "twin:?object=can&loop: name=value expected, 'loop' given"
-
-
-def test_what_comes_after_a_hash_is_refused():
-    with pytest.raises(ValueError) as error:
-        parse("twin:?object=can#1")
-    assert str(error.value) == "twin:?object=can#1: nothing after # expected, '1' given"
 
 
 def test_unknown_parameters():
     address = parse("twin:?objekt=can&seed=1&sede=2")[1]
     address.only("objekt", "seed", "sede")
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match="objekt, sede; there are object, seed"):
         address.only("object", "seed")
-    assert str(error.value) == (
-        "twin:?objekt=can&seed=1&sede=2: unknown parameter objekt, sede; there are object, seed"
-    )
 
 
 def test_names_of_fingers():
@@ -95,23 +65,15 @@ def test_names_of_fingers():
 
 
 @pytest.mark.parametrize(
-    "given", ["thumb", "1:", ":thumb", "one:thumb", "-1:thumb", "1=thumb", "²:t"]
+    "given",
+    [
+        *("thumb", "1:", ":thumb", "one:thumb", "-1:thumb", "1=thumb", "²:t"),
+        *("1:thumb,2:thumb", "1:thumb,1:index"),
+    ],
 )
 def test_invalid_names(given):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=repr(given)):
         parse(f"xela:?fingers={given}")[1].names()
-    assert str(error.value) == (
-        f"xela:?fingers={given}: fingers=1:thumb,2:index expected, {given!r} given"
-    )
-
-
-@pytest.mark.parametrize("given", ["1:thumb,2:thumb", "1:thumb,1:index"])
-def test_repeated_names(given):
-    with pytest.raises(ValueError) as error:
-        parse(f"xela:?fingers={given}")[1].names()
-    assert str(error.value) == (
-        f"xela:?fingers={given}: a name for each finger expected, {given!r} given"
-    )
 
 
 def test_an_existing_file_is_no_uri(tmp_path, monkeypatch):
@@ -135,22 +97,10 @@ def test_speed_and_loop_are_for_the_replay_and_the_twin(tmp_path):
         assert source.name == text
 
 
-def test_every_scheme_is_described():
-    for scheme, text in SCHEMES.items():
-        assert f"{scheme}:" in text
-
-
 def test_nothing_is_imported_for_other_schemes():
-    import subprocess
-
     code = (
         "import sys; from holdfast.devices.sources import open_source; open_source('a.parquet'); "
         "print([n for n in ('serial', 'websockets', 'cyclonedds', 'mujoco') if n in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"
-
-
-@pytest.mark.parametrize("module", ["uri", "sources"])
-def test_a_module_can_be_imported_first(module):
-    subprocess.run([sys.executable, "-c", f"import holdfast.devices.{module}"], check=True)

@@ -9,44 +9,6 @@ def write(folder, text):
     return path
 
 
-def test_blocks_and_their_notes(folder):
-    page = write(
-        folder, "a\n\n```sh\nls\n```\n\n<!-- not run: why -->\n```python\n1\n```\n```\nx\n```\n"
-    )
-    assert [(b.line, b.language, b.text, b.note) for b in blocks.blocks_of(page)] == [
-        (3, "sh", "ls\n", ""),
-        (7, "python", "1\n", "not run: why"),
-        (11, "", "x\n", ""),
-    ]
-
-
-def test_only_some_sections(folder):
-    page = write(
-        folder, "```python\n1\n```\n## A\n```python\n1\n```\n## B\n```python\n1 / 0\n```\n"
-    )
-    assert [block.section for block in blocks.blocks_of(page)] == ["", "A", "B"]
-    assert blocks.run_page(page, {}, ("", "A")) == 2
-
-
-def test_python_blocks_share_their_names(folder):
-    page = write(folder, "```python\nx = 1\n```\n```python\nassert x == 1\n```\n```json\n{\n```\n")
-    assert blocks.run_page(page) == 2
-
-
-def test_an_error_of_python_has_the_line_of_the_page(folder):
-    page = write(folder, "one\n```python\n\nraise KeyError\n```\n")
-    with pytest.raises(KeyError) as raised:
-        blocks.run_page(page)
-    assert raised.traceback[-1].lineno + 1 == 4
-
-
-def test_a_command(folder):
-    (folder / "a.txt").write_text("x\n")
-    page = write(folder, "```sh\ncp a.txt \\\n  b.txt  # copy\n```\n")
-    assert blocks.run_page(page) == 1
-    assert (folder / "b.txt").read_text() == "x\n"
-
-
 @pytest.mark.parametrize(
     ("line", "message"),
     [
@@ -65,15 +27,6 @@ def test_options_of_commands_that_do_not_run_must_exist(folder):
     with pytest.raises(Exception, match="No such option: --sped"):
         blocks.run_page(write(folder, page.format("holdfast demo --sped 0")))
     with pytest.raises(Exception, match="No such command 'demonstrate'"):
-        blocks.run_page(write(folder, page.format("holdfast demonstrate")))
-
-
-def test_an_endless_command_is_interrupted(folder):
-    page = "<!-- until Ctrl-C -->\n```sh\n{}\n```\n"
-    program = 'import sys, time; print("Ctrl-C stops it", file=sys.stderr); time.sleep(60)'
-    with pytest.raises(AssertionError, match="Traceback"):
-        blocks.run_page(write(folder, page.format(f"python -c '{program}'")))
-    with pytest.raises(AssertionError, match="holdfast: No such"):
         blocks.run_page(write(folder, page.format("holdfast demonstrate")))
 
 

@@ -1,6 +1,3 @@
-import dataclasses
-import re
-
 import pytest
 from msgspec.structs import replace
 
@@ -8,7 +5,6 @@ from holdfast import twin_recordings
 from holdfast.cli import demo
 from holdfast.io import save_recording
 from holdfast.parallel import Engine
-from holdfast.recordings import Tactile
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
@@ -52,34 +48,6 @@ def test_a_hand_of_ones_own(folder, hand):
     assert blocks.run_page(README, replaced, HAND) == 1
 
 
-def test_the_live_program_prints_times_that_a_person_can_read(folder, capsys):
-    """Devices send times since 1970."""
-    recording = synthetic_recording("live", 0)
-    modules = {
-        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
-        for name, m in recording.modules.items()
-    }
-    (folder / "recordings").mkdir()
-    for name in ("live.parquet", "recordings/grasp1.parquet"):
-        save_recording(dataclasses.replace(recording, modules=modules), folder / name)
-    replaced = {'open_source("xela://auto")': 'open_source("live.parquet", speed=0)'}
-    replaced["print(states"] = "str(states"
-    blocks.run_page(README, replaced, CODE)
-    lines = capsys.readouterr().out.splitlines()
-    assert lines
-    for line in lines:
-        assert re.fullmatch(r"\d{1,2}\.\d\d s  \w+: [A-Z_]+", line)
-
-
 def test_every_section_is_run():
     sections = {block.section for block in blocks.blocks_of(README)}
     assert sections == {*DEMO, *HAND, *FILES, *CODE}
-
-
-def test_the_links_exist():
-    for target, _ in blocks.links_of(README):
-        assert (blocks.ROOT / target).exists(), target
-
-
-def test_no_path_of_this_machine_is_named():
-    assert not re.search(r"/work/|/root/|/home/", README.read_text("utf-8"))

@@ -38,24 +38,3 @@ def test_a_table_of_results_has_the_trivial_baseline(page):
     assert results
     for table in results:
         assert TRIVIAL.search(table), table.partition("\n")[0]
-
-
-@pytest.mark.parametrize(
-    ("page", "sentence"),
-    [
-        ("README.md", "about nine of ten"),
-        ("README.md", "one of five"),
-        ("README.md", "in a minute or two"),
-        ("docs/real-data.md", "never makes the model more sensitive"),
-        ("docs/study/slips.md", "300 randomized hands"),
-        ("docs/study/built-in-models.md", "300 randomized hands"),
-    ],
-)
-def test_a_sentence_that_does_not_hold(page, sentence):
-    assert sentence not in (blocks.ROOT / page).read_text("utf-8")
-
-
-@pytest.mark.parametrize("page", ["README.md", "docs/index.md"])
-def test_the_first_lines_say_what_was_never_tried(page):
-    text = (blocks.ROOT / page).read_text("utf-8")
-    assert "No sensor and no hand was ever connected" in text[:900]

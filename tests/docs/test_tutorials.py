@@ -105,28 +105,6 @@ def test_how_to(folder):
     assert (folder / "part.parquet").exists()
 
 
-def test_a_grid_search_on_real_recordings(folder, data_folder, capsys):
-    """The block of from-python.md, on recordings of three objects that are imported here."""
-    from holdfast.io import load_dataset
-    from holdfast.io.importers import import_recordings
-
-    (folder / "recordings").mkdir()
-    for place, recording in enumerate(import_recordings(data_folder / "uskin_pick_move")):
-        named = {**recording.metadata, "object": f"grasp {place % 3}"}
-        changed = recording.__class__(recording.name, recording.modules, named)
-        save_recording(changed, folder / "recordings" / f"{recording.name}.parquet")
-    (block,) = [
-        each
-        for each in blocks.blocks_of(DOCS / "tutorials" / "from-python.md")
-        if "GridSearchCV" in each.text
-    ]
-    names = {"__name__": "__main__", "recordings": load_dataset("recordings")}
-    blocks.run_block(block, names)
-    assert 0.5 < names["search"].best_score_ <= 1
-    assert (folder / "searched.json").exists()
-    assert capsys.readouterr().err == ""
-
-
 PAGES = [
     *DOCS.rglob("*.md"),
     blocks.ROOT / "README.md",
@@ -134,22 +112,6 @@ PAGES = [
     blocks.ROOT / "CHANGELOG.md",
     blocks.ROOT / "examples" / "README.md",
 ]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(blocks.ROOT)))
-def test_a_numbered_list_goes_on(page):
-    """A block that is not indented ends a list: the site would number it 1, 2, 3, 1, 1."""
-    ended = fenced = False
-    for line in page.read_text("utf-8").splitlines():
-        fenced ^= line.startswith("```")
-        number = re.match(r"(\d+)\. ", line)
-        if fenced or line.startswith("```"):
-            ended = True
-        elif number:
-            assert number[1] == "1" or not ended, line
-            ended = False
-        elif line.strip() and not line.startswith(" "):
-            ended = True
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(blocks.ROOT)))

@@ -95,9 +95,3 @@ def test_the_header_runs_beside_python(capsys):
     printed = capsys.readouterr().out
     assert "1725 samples: 0 states differ" in printed
     assert float(printed.split()[-1]) < 1e-9
-
-
-def test_every_file_is_in_the_table():
-    table = (FOLDER / "README.md").read_text("utf-8")
-    for path in FOLDER.iterdir():
-        assert path.name in ("README.md", "__pycache__") or f"]({path.name})" in table

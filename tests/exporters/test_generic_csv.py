@@ -87,7 +87,7 @@ def test_a_sensor_of_its_own_is_a_file_beside_the_table(tmp_path):
     (back,) = read(tmp_path / "out", sensors={"thumb": Sensor.from_json(path)})
     assert_equal(back.modules["thumb"], recording.modules["thumb"])
     changed = Recording("b", {"thumb": tactile(flat_sensor("my skin", 2, 2, 0.005))})
-    with pytest.raises(RecordingError, match="in different recordings; export them apart"):
+    with pytest.raises(RecordingError, match="apart"):
         export([recording, changed], tmp_path / "more")
     assert not (tmp_path / "more").exists()
 
@@ -103,7 +103,7 @@ def test_what_a_table_cannot_hold_is_named(tmp_path):
 
 @pytest.mark.parametrize("name", ["=1+1", "a,b", "a=b", " a", "a ", 'a"b', "a\nb", "@a", ""])
 def test_a_name_that_no_header_holds_is_refused(tmp_path, name):
-    with pytest.raises(RecordingError, match="cannot be the name of columns"):
+    with pytest.raises(RecordingError, match="columns"):
         export([Recording("a", {name: tactile()})], tmp_path / "out")
     assert list(tmp_path.iterdir()) == []
 
@@ -116,7 +116,7 @@ def test_one_table_may_be_a_file(tmp_path):
     with pytest.raises(OutputError, match="exists already"):
         export([recording], tmp_path / "x.csv")
     export([recording], tmp_path / "x.csv", force=True)
-    with pytest.raises(OutputError, match="is one table; a folder expected"):
+    with pytest.raises(OutputError, match="a folder expected"):
         export([recording, recording], tmp_path / "y.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
 
@@ -127,5 +127,5 @@ def test_no_file_is_overwritten(tmp_path):
         export([Recording(name, {"b": tactile()}) for name in ("0", "a")], tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.csv"]
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(OutputError, match="is a file; a folder"):
+    with pytest.raises(OutputError, match="a folder"):
         export([Recording("a", {"b": tactile()})], tmp_path / "file")

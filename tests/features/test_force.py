@@ -50,12 +50,6 @@ def test_half_a_second_is_the_same_number_of_samples_whenever_it_begins(start, r
     assert np.array_equal(found, fingertip_force(values, which, 0.5), equal_nan=True)
 
 
-def test_the_mean_of_the_first_75_samples_is_zero_force():
-    values = np.repeat(readings(1), 100, axis=0).astype(float)
-    values[:75] += np.linspace(-1, 1, 75)[:, None, None]
-    assert np.abs(fingertip_force(values, CURVED)[75:]).max() < 1e-6
-
-
 def test_first():
     values = readings(5)
     found = fingertip_force(values, CURVED, "first")
@@ -83,9 +77,8 @@ def test_interval(given):
 
 @pytest.mark.parametrize("n", [0, 10])
 def test_an_interval_without_samples_is_refused(n):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="5:6"):
         fingertip_force(readings(n), CURVED, (5.0, 6.0))
-    assert str(raised.value) == "tare 5:6: no finite sample in that time"
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
@@ -108,9 +101,8 @@ def test_first_is_the_first_finite_sample():
 
 
 def test_no_finite_sample_at_all():
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=r"0.5"):
         fingertip_force(np.full((100, 30, 3), np.nan), CURVED)
-    assert str(raised.value) == "tare 0.5: no finite sample in that time"
 
 
 def test_a_tare_shorter_than_a_period_takes_one_sample():
@@ -142,22 +134,20 @@ def test_the_future_changes_nothing(k, tare):
 @pytest.mark.parametrize(
     ("shape", "message"),
     [
-        ((9, 24, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 24, 3) given"),
-        ((9, 30, 2), "readings of shape (n, 30, 3) expected for uskin-curved, (9, 30, 2) given"),
-        ((30, 3), "readings of shape (n, 30, 3) expected for uskin-curved, (30, 3) given"),
+        ((9, 24, 3), "uskin-curved"),
+        ((9, 30, 2), "uskin-curved"),
+        ((30, 3), "uskin-curved"),
     ],
 )
 def test_refuses_other_shapes(shape, message):
-    with pytest.raises(RecordingError) as raised:
+    with pytest.raises(RecordingError, match=message):
         fingertip_force(np.zeros(shape), CURVED)
-    assert str(raised.value) == message
 
 
 @pytest.mark.parametrize("n", [8, 10])
 def test_refuses_other_times(n):
-    with pytest.raises(RecordingError) as raised:
+    with pytest.raises(RecordingError, match="times"):
         fingertip_force(readings(9), CURVED, times=np.arange(n))
-    assert str(raised.value) == f"9 samples given with times of shape ({n},)"
 
 
 def module(values, which=CURVED, times=None):

@@ -34,8 +34,8 @@ def test_no_window_goes_across_a_gap():
 
 def test_bad_input(monkeypatch):
     made = synthetic_recording("made", 0, ("thumb",))
-    with pytest.raises(ValueError, match="an even window of at least 2 samples expected, 3 given"):
+    with pytest.raises(ValueError, match="3 given"):
         features_frame(made, window=3)
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(MissingExtra, match=r"needs the package pandas.*pandas"):
+    with pytest.raises(MissingExtra, match="pandas"):
         features_frame(made)

@@ -110,17 +110,14 @@ def test_a_window_as_long_as_the_data():
 
 @pytest.mark.parametrize("window", [-2, 0, 1, 3, 13, 14.5])
 def test_refuses_windows_that_are_no_pairs(window):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=f"{window} given"):
         haar_features(walk(20), window)
-    expected = f"an even window of at least 2 samples expected, {window} given"
-    assert str(raised.value) == expected
 
 
 @pytest.mark.parametrize("shape", [(20,), (20, 2), (20, 4), (2, 10, 3)])
 def test_refuses_other_shapes(shape):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match="force"):
         haar_features(np.zeros(shape), 14)
-    assert str(raised.value) == f"a force of shape (n, 3) expected, {shape} given"
 
 
 @pytest.mark.parametrize("order", ["C", "F"])

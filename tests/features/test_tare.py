@@ -1,3 +1,5 @@
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -29,10 +31,8 @@ def test_forms(given, expected):
      "1:2:3", (1,), (1, 2, 3), (2, 1), None],
 )  # fmt: skip
 def test_refusals(given):
-    with pytest.raises(ValueError) as raised:
+    with pytest.raises(ValueError, match=re.escape(repr(given))):
         Tare.parse(given)
-    expected = f"tare: seconds above 0, 'first', 'none' or START:END expected, {given!r} given"
-    assert str(raised.value) == expected
 
 
 @pytest.mark.parametrize("text", ["0.5", "1", "0.123456789", "first", "none", "1:2", "0.5:1.25"])

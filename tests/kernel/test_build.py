@@ -2,7 +2,6 @@
 
 import importlib.util
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -104,25 +103,15 @@ def test_a_build_without_a_compiler_takes_the_one_of_the_package_index(
 
 
 @pytest.mark.parametrize(
-    ("missing", "message"),
-    [
-        ("GIL", "holdfast needs a Python with the GIL: this one is free-threaded"),
-        (
-            "Python.h",
-            "no /nowhere/Python.h: install the headers of Python (Debian: apt install python3-dev)",
-        ),
-        (
-            "compiler",
-            "no C compiler: install one (Debian: apt install gcc libc6-dev), or set CC",
-        ),
-    ],
+    ("missing", "named"),
+    [("GIL", "GIL"), ("Python.h", "apt install python3-dev"), ("compiler", "apt install gcc")],
 )
-def test_one_line_says_what_a_build_is_missing(setup, no_compiler, monkeypatch, missing, message):
+def test_one_line_says_what_a_build_is_missing(setup, no_compiler, monkeypatch, missing, named):
     if missing == "GIL":
         monkeypatch.setattr(sysconfig, "get_config_var", lambda name: 1)
     if missing == "Python.h":
         monkeypatch.setattr(sysconfig, "get_path", lambda name: "/nowhere")
-    with pytest.raises(SystemExit, match=f"^{re.escape(message)}$"):
+    with pytest.raises(SystemExit, match=named):
         setup.choose_compiler()
 
 

@@ -9,12 +9,9 @@ import pytest
 from msgspec.structs import replace
 
 from detector.build import cause_head, lively, model
-from exporters.c_detector import random_samples
-from exporters.models import made
 from holdfast.contact import Cause
 from holdfast.detector import Detector
-from holdfast.detector.tables import ESTIMATE, estimate_rows, rules_of
-from holdfast.errors import StreamError
+from holdfast.detector.tables import ESTIMATE, rules_of
 from holdfast.exporters.c_header import ctypes_of, kernel_text, structs_of
 from holdfast.kernel import _extension
 
@@ -31,56 +28,6 @@ def with_causes(**options):
     }
     debounce = replace(made_model.debounce, switching=15.0, hysteresis=0.1, hold=0.05)
     return replace(made_model, fingers=fingers, debounce=debounce)
-
-
-def answer(detector, samples, time):
-    try:
-        return detector.update(samples, time)
-    except StreamError as error:
-        return str(error)
-
-
-def test_a_finger_without_the_head_of_causes_has_none():
-    used = with_causes()
-    index = used.fingers["index"]
-    plain = replace(index, heads=tuple(head for head in index.heads if head.name != "cause"))
-    detector, found = Detector(replace(used, fingers=used.fingers | {"index": plain})), []
-    for k, sample in enumerate(lively(200)):
-        fingers = detector.update({"thumb": sample, "index": sample}, k / 100).fingers
-        found.append((fingers["thumb"].cause, fingers["index"].cause, fingers["index"].state))
-    assert any(state == "UNSTABLE" for *_, state in found)
-    assert any(thumb is not None for thumb, *_ in found)
-    assert {index for _, index, _ in found} == {None}
-
-
-@pytest.mark.parametrize("name", ["paper", "twin", "rich"])
-def test_chunks_of_any_length_give_the_estimates_of_updates(name):
-    used, sensors, rate = made(name)
-    one, many = Detector(used, sensors, rate), Detector(used, sensors, rate)
-    bounds = np.cumsum([0, *(finger.n_taxels for finger in sensors.values())])
-    rng, last, rows = np.random.default_rng(5), -np.inf, []
-    for samples, time in random_samples(rng, sensors, rate, 500):
-        estimate, before = answer(one, samples, time), last
-        last = max(last, time)
-        if before < time < np.inf and not isinstance(estimate, str):
-            readings = np.full((bounds[-1], 3), np.nan)
-            for finger, first, stop in zip(sensors, bounds, bounds[1:], strict=False):
-                if finger in samples:
-                    readings[first:stop] = samples[finger]
-            rows.append((readings, [finger in samples for finger in sensors], time, estimate))
-    readings, present, times = (np.array(column) for column in list(zip(*rows, strict=True))[:3])
-    estimates, numbers = estimate_rows(*present.shape)
-    for start, stop in ((0, 1), (1, 200), (200, 200), (200, len(times))):
-        part, hand = slice(start, stop), np.zeros(stop - start)
-        many._kernel.run(readings[part], present[part], times[part], numbers[part], hand)
-    for (*_, expected), found in zip(rows, estimates, strict=True):
-        for finger, row in zip(expected.fingers.values(), found, strict=True):
-            assert (finger.state.code, repr(finger.time)) == (
-                row["state"],
-                repr(float(row["time"])),
-            )
-            assert repr(finger.stable_probability) == repr(float(row["probability"]))
-            assert repr(finger.force) == repr(tuple(row["force"].tolist()))
 
 
 class TestEstimates:
@@ -188,7 +135,7 @@ class TestDetector:
                 return 1.0
 
         heads[0] = heads[0] | {"gain": Cutting()}
-        with pytest.raises(IndexError, match="list index out of range"):
+        with pytest.raises(IndexError):
             detector.set_rules(rules, heads, weights)
 
     def test_a_number_cannot_call_the_detector(self):
@@ -202,6 +149,6 @@ class TestDetector:
                 return 1.0
 
         heads[0] = heads[0] | {"gain": Calling()}
-        with pytest.raises(RuntimeError, match="another thread is using this detector"):
+        with pytest.raises(RuntimeError, match="another thread"):
             detector.set_rules(rules, heads, weights)
         assert detector.update({}, 1.0) is not None

@@ -10,10 +10,9 @@ SOURCES = Path(holdfast.__file__).with_name("kernel")
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 
 
-@pytest.mark.parametrize("sizes", [(), ("-DHOLDFAST_VECTORS_FIXED",)], ids=["fields", "macros"])
-@pytest.mark.parametrize("real", [(), ("-DHOLDFAST_SINGLE",)], ids=["double", "single"])
-def test_the_program_without_python(tmp_path, sizes, real):
-    words = ["cc", "-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *sizes, *real]
+@pytest.mark.parametrize("options", [(), ("-DHOLDFAST_VECTORS_FIXED", "-DHOLDFAST_SINGLE")])
+def test_the_program_without_python(tmp_path, options):
+    words = ["cc", "-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *options]
     run = tmp_path / "check"
     subprocess.run([*words, "-I", SOURCES, PROGRAM, "-o", run, "-lm"], check=True)
     done = subprocess.run([run], capture_output=True, text=True, check=False, timeout=60)

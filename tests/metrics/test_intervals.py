@@ -71,10 +71,6 @@ def test_fewer_than_two_recordings_have_no_interval():
     assert bootstrap_interval(ratio_of_sums([1], [2]), 1) is None
 
 
-def test_equal_recordings_have_an_interval_without_width():
-    assert bootstrap_interval(ratio_of_sums([1, 1, 1], [2, 2, 2]), 3) == (0.5, 0.5)
-
-
 def test_the_seed_decides_and_the_level_widens():
     values = RNG.normal(size=40)
     mean = ratio_of_sums(values, np.ones(40))

@@ -76,11 +76,6 @@ def test_short_runs_are_dropped():
     assert text(drop_short_runs(mask("#.##.###"), 2)) == "..##.###"
 
 
-def test_filling_before_dropping_keeps_an_interrupted_run():
-    filled = fill_short_gaps(mask("#.#.#....#..."), 3)
-    assert text(drop_short_runs(filled, 3)) == "#####........"
-
-
 @given(st.lists(st.booleans(), min_size=1), st.integers(1, 5))
 def test_filling_only_adds_and_dropping_only_removes(values, n):
     given_mask = np.array(values)

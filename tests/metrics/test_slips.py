@@ -403,8 +403,3 @@ class TestThresholds:
 
     def test_no_summary_without_slips_that_are_known(self):
         assert slip_summary([{}, {}]) is None
-
-    def test_thresholds_are_probabilities_in_order(self):
-        assert (np.diff(SLIP_THRESHOLDS) > 0).all()
-        assert 0 < SLIP_THRESHOLDS[0] < 0.02  # log odds of -4
-        assert 0.999 < SLIP_THRESHOLDS[-1] < 1  # log odds of 8

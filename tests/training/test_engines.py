@@ -117,6 +117,3 @@ class TestManyRecordings:
             *(f"grasp-{k}" for k in range(6)), "grasp-9",
         ]  # fmt: skip
         assert all(each.fingers["thumb"].n for each in found.recordings)
-
-    def test_the_search_of_a_group_leaves_it_out(self):
-        assert trainer.MAX_FITS % trainer.MAX_SEARCHES == 0

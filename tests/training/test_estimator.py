@@ -110,9 +110,7 @@ def test_cross_validation_scores_are_those_of_leaving_objects_out(grasps):
 def test_refusals(grasps):
     with pytest.raises(NotFittedError):
         StabilityClassifier().predict(grasps)
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match="labels"):
         StabilityClassifier().fit([tiny_recording(0, states=[None] * 4)])
-    assert str(refusal.value) == "none of the 1 recordings has labels to train from"
-    with pytest.raises(ValueError) as refused:
+    with pytest.raises(ValueError, match="'magic'"):
         StabilityClassifier("magic").fit(grasps)
-    assert str(refused.value) == "unknown classifier 'magic'; there are logreg, svm"

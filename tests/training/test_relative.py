@@ -16,7 +16,7 @@ from holdfast.training.model_fit import fit_recordings
 from holdfast.training.splits import split_data
 from holdfast.training.training_samples import SamplesPlan, gather_samples
 
-from .build import TINY, tiny_module, tiny_recording
+from .build import TINY, tiny_recording
 
 ANY = parse_features("any")
 SETTING = Setting(features=ANY, trials=0, hold=0.1)
@@ -58,10 +58,8 @@ def test_a_sensor_of_one_taxel_leaves_out_what_compares_taxels(mixed, is_first):
     model = train(recordings, SETTING, warn=warnings.append).model
     kept = model.fingers[ANY_FINGER].features
     assert {spec.kind for spec in kept} == {"force_change", "shear_change", "load_to_noise"}
-    assert [text for text in warnings if "taxel" in text] == [
-        "residual, shear_residual, pressure_shift, moment_change left out: tiny has 1 taxel, they "
-        "need at least 2"
-    ]
+    (text,) = [text for text in warnings if "taxel" in text]
+    assert text.startswith("residual, shear_residual, pressure_shift, moment_change left out")
 
 
 def test_options_that_are_given_count(mixed):
@@ -101,25 +99,10 @@ def test_units_and_gains_do_not_change_the_samples():
 @pytest.mark.parametrize("rate", [20.0, 1100.0])
 def test_a_rate_that_the_features_are_not_made_for(mixed, rate):
     odd = tiny_recording(6, rate=rate, n=round(10 * rate))
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=f"'grasp-6' has {rate:g} Hz"):
         scan_dataset([*mixed, odd], relative=True)
-    assert str(refusal.value) == (
-        f"recording 'grasp-6' has {rate:g} Hz, relative features expect 30 to 1000 Hz"
-    )
 
 
 def test_a_recording_without_labels_may_have_any_rate(mixed):
     bare = tiny_recording(7, rate=5.0, n=50, states=[None] * 4)
     assert len(scan_dataset([*mixed, bare], relative=True).recordings) == 4
-
-
-def test_other_features_still_need_one_sensor(mixed):
-    with pytest.raises(TrainingError, match="has the sensor"):
-        train(mixed, replace(SETTING, features=parse_features("F_a,sigma"), shared=False))
-
-
-def test_modules_may_have_any_sensors_within_a_recording():
-    own = tiny_recording(8)
-    other = tiny_module(9, sensor=sensor("anyskin"))
-    both = replace(own, modules={**own.modules, "palm": other})
-    assert len(samples_of([both])[ANY_FINGER].samples.positive) > 0

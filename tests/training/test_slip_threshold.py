@@ -12,7 +12,6 @@ from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.contact import ContactState
 from holdfast.errors import ModelError, TrainingError
 from holdfast.features import parse_features
-from holdfast.io import load_dataset, save_recording
 from holdfast.metrics import summarise
 from holdfast.metrics.slip_thresholds import MAX_RAISED_QUIET, slip_curve
 from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTruth
@@ -69,13 +68,6 @@ def rule_of(model):
 
 def slips_of(model, recordings):
     return summarise([compute_decisions(model, made) for made in recordings]).slips.pooled
-
-
-def unsmoothed(model):
-    """The model whose probability of a slip is that of each sample alone."""
-    return model.changed(
-        lambda part: part.with_heads(msgspec.structs.replace(part.slip, smoothing=0.0))
-    )
 
 
 class TestTraining:
@@ -157,13 +149,6 @@ class TestTraining:
         assert rule_of(found.model) is not None
         assert found.cross_validation.slips.pooled.onsets == "labels"
 
-    def test_engines_give_the_same(self, recordings, trained, tmp_path):
-        for made in recordings:
-            save_recording(made, tmp_path / f"{made.name}.parquet")
-        found = train(load_dataset(tmp_path), SETTING, n_jobs=2)
-        assert found.model.fingers == trained[0].model.fingers
-        assert found.cross_validation == trained[0].cross_validation
-
 
 class TestNoRule:
     def test_without_slips(self, grasps):
@@ -181,11 +166,9 @@ class TestNoRule:
         warnings = []
         found = train(few, SETTING, warn=warnings.append)
         assert rule_of(found.model) is None
-        n_still = 3 * 1300 - 40
-        assert [text for text in warnings if "slip" in text] == [
-            f"all fingers: 10 samples that slide and {n_still} that hold still given, at least "
-            f"{MIN_SLIDING_SAMPLES} and 1 expected; the model gets no slip rule there"
-        ]
+        (text,) = [text for text in warnings if "slip" in text]
+        assert f"10 samples that slide and {3 * 1300 - 40}" in text
+        assert f"at least {MIN_SLIDING_SAMPLES}" in text
 
     def test_with_false_alarms_at_every_threshold(self, model):
         n = 6000
@@ -193,10 +176,7 @@ class TestNoRule:
         truth = SlipTruth(still, still == STILL, (), "truth")
         sure = SlipDecisions(times, np.full(n, 1 - 1e-9), still == STILL, 0.0, truth)
         chosen = choose_slip_threshold([{"thumb": slip_curve(sure)}] * 2, [0, 1], 0)
-        assert chosen.reason == (
-            "no threshold of slips has at most 1 false alarms a minute in 2 min of held time; the "
-            "model gets no slip rule"
-        )
+        assert "at most 1 false alarms a minute in 2 min" in chosen.reason
         assert rule_of(with_slip_threshold(model, chosen)) is None
 
     @pytest.mark.parametrize("code", [STILL, NOT_HELD])
@@ -237,17 +217,6 @@ class TestTuning:
         assert metrics == tuned.chosen.slips
         assert slips_of(model, others) == tuned.before.slips
 
-    def test_a_higher_rate_never_finds_less(self, model, others):
-        strict, loose = (tune(model, others, rate, "slip") for rate in (1.0, 20.0))
-        assert loose.chosen.threshold <= strict.chosen.threshold
-        assert loose.chosen.missed["0.1"] <= strict.chosen.missed["0.1"]
-
-    def test_points_around_it_are_in_order(self, model, others):
-        tuned = tune(model, others, 5.0, "slip")
-        thresholds = [point.threshold for point in tuned.points]
-        assert thresholds == sorted(thresholds)
-        assert tuned.chosen in tuned.points
-
     def test_the_model_keeps_how_it_was_tuned(self, model, others):
         named = msgspec.structs.replace(model, name="mine")
         tuned = tune(named, others, 5.0, "slip")
@@ -262,22 +231,17 @@ class TestTuning:
 
     @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
     def test_a_rate_that_is_none(self, model, others, rate):
-        with pytest.raises(ValueError) as refusal:
+        with pytest.raises(ValueError, match="false alarms"):
             tune(model, others, rate, "slip")
-        assert str(refusal.value) == f"false alarms per minute above 0 expected, {rate:g} given"
 
     def test_a_model_without_a_rule(self, others):
-        with pytest.raises(ModelError) as refusal:
+        with pytest.raises(ModelError, match="slip rule"):
             tune(Model.load("builtin:noise-floor"), others, 1.0, "slip")
-        assert str(refusal.value).endswith(
-            "has no slip rule; train one on recordings whose slips are known"
-        )
 
     def test_recordings_without_labels_or_truth(self, model):
         bare = tiny_recording(1, states=(None,) * 4)
-        with pytest.raises(TrainingError) as refusal:
+        with pytest.raises(TrainingError, match="slips"):
             tune(model, [bare], 1.0, "slip")
-        assert str(refusal.value) == "1 recordings without slips that are known"
 
     def test_labels_without_slips_have_false_alarms_only(self, model):
         quiet = tiny_recording(1, states=(ContactState.NO_CONTACT, *[ContactState.STABLE] * 3))
@@ -286,8 +250,5 @@ class TestTuning:
         assert rule_of(tuned.model).choice.found is None
 
     def test_a_held_time_that_is_too_short(self, model, others):
-        with pytest.raises(TrainingError) as refusal:
+        with pytest.raises(TrainingError, match=r"0.28 min"):
             tune(model, others[:1], 1.0, "slip")
-        assert str(refusal.value) == (
-            "0.28 min of held time given; 1 false alarms a minute need at least 1 min"
-        )

@@ -14,8 +14,6 @@ from holdfast.training.splits import (
     split_data,
 )
 
-ALONE = "the split by {} needs at least two, 1 given ({}); the split by time needs one recording"
-
 
 def entries(*objects):
     return [
@@ -59,20 +57,14 @@ def test_random_fifths_differ_by_recording_and_seed():
 @pytest.mark.parametrize(
     ("objects", "split", "message"),
     [
-        (
-            ["can", None],
-            "object",
-            "recording 'grasp-1' does not name its object ('object' in its metadata); the split "
-            "by object needs the object of every recording",
-        ),
-        (["can", "can"], "object", ALONE.format("object", "can")),
-        (["can"], "recording", ALONE.format("recording", "grasp-0")),
+        (["can", None], "object", "'grasp-1'"),
+        (["can", "can"], "object", "split by object"),
+        (["can"], "recording", "split by time"),
     ],
 )
 def test_refusals(objects, split, message):
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=message):
         split_data(entries(*objects), split, 0)
-    assert str(refusal.value) == message
 
 
 def test_a_unit_of_the_split_by_time_is_a_block_of_every_recording():

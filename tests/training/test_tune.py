@@ -96,26 +96,19 @@ def test_a_threshold_that_misses_every_event_is_not_used(model, others):
 
 @pytest.mark.parametrize("wanted", [-1.0, np.nan, np.inf])
 def test_a_rate_below_0(model, others, wanted):
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match="false alarms"):
         tune(model, others, wanted)
-    assert str(refusal.value) == (
-        f"false alarms per minute of at least 0 expected, {wanted:g} given"
-    )
 
 
 def test_recordings_without_labels(model):
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match="labels"):
         tune(model, [tiny_recording(50, states=[None] * 4)], 1.0)
-    assert str(refusal.value) == "none of the recordings (1) has labels; labels expected"
 
 
 def test_recordings_without_a_stable_hold(model):
     states = (ContactState.NO_CONTACT, None, ContactState.UNSTABLE, ContactState.UNSTABLE)
-    with pytest.raises(TrainingError) as refusal:
+    with pytest.raises(TrainingError, match="stable"):
         tune(model, [tiny_recording(51, states=states)], 1.0)
-    assert str(refusal.value) == (
-        "no time in which the hand is labelled stable; false alarms are counted per minute of it"
-    )
 
 
 def test_a_model_that_is_never_stable(model, others):
@@ -123,12 +116,8 @@ def test_a_model_that_is_never_stable(model, others):
         name: msgspec.structs.replace(part, contact_threshold=1e9)
         for name, part in model.fingers.items()
     }
-    with pytest.raises(ModelError) as refusal:
+    with pytest.raises(ModelError, match="never STABLE"):
         tune(msgspec.structs.replace(model, fingers=blind), others, 1.0)
-    assert str(refusal.value) == (
-        "the model cannot be tuned: the hand is never STABLE at any threshold while it is "
-        "labelled stable (see holdfast detect --summary)"
-    )
 
 
 def test_a_rate_that_no_threshold_reaches(model):

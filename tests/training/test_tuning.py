@@ -55,13 +55,6 @@ def test_the_same_seed_finds_the_same_parameters(name):
     assert run(Spy(name), seed=1) is not None
 
 
-def test_another_seed_tries_others():
-    one, two = Spy(), Spy()
-    run(one)
-    run(two, seed=1)
-    assert one.asked[3] != two.asked[3]
-
-
 def test_the_first_trial_is_the_reference_setting():
     spy = Spy()
     assert run(spy, n_trials=1) == spy.reference

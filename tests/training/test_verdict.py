@@ -1,5 +1,7 @@
 """The sentence on what a model is good for: each of its forms."""
 
+import re
+
 import msgspec
 import numpy as np
 import pytest
@@ -35,54 +37,31 @@ def late(n_events):
     return np.where(np.arange(len(LABELS)) < 1000 * n_events, STABLE, LABELS)
 
 
-def test_a_model_without_decisions():
-    assert verdict(metrics(np.full(12_000, UNKNOWN))) == (
-        "Not usable: no labelled sample has a decision (tare, warm-up, gaps or faults)."
-    )
+CALM = np.where(np.arange(12_000) < 5000, UNSTABLE, STABLE)
+ALWAYS = np.full(12_000, STABLE)
+NEVER = np.full(12_000, UNSTABLE)
 
 
-def test_a_model_that_is_never_stable():
-    found = verdict(metrics(np.full(12_000, UNSTABLE)))
-    assert found == "Not usable: it never says STABLE."
-
-
-def test_a_model_that_is_always_stable_is_not_praised():
-    found = verdict(metrics(np.full(12_000, STABLE)))
-    assert found == "Not usable: it always says STABLE."
-
-
-def test_a_model_like_chance():
-    found = verdict(metrics(with_false_alarms(1000), np.full(12_000, 0.5)))
-    assert found == ("Not usable: it orders stable and unstable samples like chance (AUC 0.50).")
-
-
-def test_a_threshold_with_many_false_alarms():
-    found = verdict(metrics(with_false_alarms(100)))
-    assert found == (
-        "Not good enough: 60 false alarms a minute at this threshold (see holdfast tune), 0 % of "
-        "12 onsets of instability missed within 0.2 s; 99 % of the samples right (always STABLE: "
-        "80 %)."
-    )
-
-
-def test_a_good_model():
-    assert verdict(metrics(LABELS, n=7)) == (
-        "Good for an automatic reaction: at most 0.27 false alarms a minute, 0 % of 84 onsets of "
-        "instability missed within 0.2 s; 100 % of the samples right (always STABLE: 80 %)."
-    )
-
-
-def test_a_model_for_a_person_who_watches():
-    found = verdict(metrics(late(2), n=7))
-    assert found.startswith(
-        "Good for a person who watches: at most 0.27 false alarms a minute, 17 % of 84"
-    )
-
-
-def test_a_model_that_misses_events():
-    assert verdict(metrics(late(5))).startswith(
-        "Not good enough: at most 1.9 false alarms a minute, 42 % of 12 onsets"
-    )
+@pytest.mark.parametrize(
+    ("arguments", "start"),
+    [
+        ((np.full(12_000, UNKNOWN),), "Not usable: no labelled sample"),
+        ((NEVER,), "Not usable: it never"),
+        ((ALWAYS,), "Not usable: it always"),
+        ((with_false_alarms(1000), np.full(12_000, 0.5)), "Not usable: .*AUC 0.50"),
+        ((with_false_alarms(100),), "Not good enough: 60 false alarms .*, 0 % of 12 .* 99 %"),
+        ((LABELS, RIGHT, LABELS, 7), "Good for an automatic reaction: at most 0.27 .* 0 % of 84"),
+        ((late(2), RIGHT, LABELS, 7), "Good for a person who watches: at most 0.27 .* 17 % of 84"),
+        ((late(5),), "Not good enough: at most 1.9 false alarms a minute, 42 % of 12 onsets"),
+        (
+            (CALM, np.where(CALM == STABLE, 0.9, 0.1), CALM),
+            "Not enough data: 0 of 20 events, 1.1 of 10 .* at most 2.6 .* no instability .* 58 %",
+        ),
+        ((LABELS, RIGHT, NEVER), "Not enough data: 0 of 20 events, 0 of 10 held minutes, 1 of 5"),
+    ],
+)
+def test_what_a_model_is_good_for(arguments, start):
+    assert re.match(start, verdict(metrics(*arguments)))
 
 
 def test_an_accuracy_below_the_commoner_class():
@@ -97,28 +76,10 @@ def test_the_commoner_class_may_be_the_other():
     assert "(never STABLE: 70 %)" in found
 
 
-def test_recordings_without_events():
-    labels = np.where(np.arange(12_000) < 5000, UNSTABLE, STABLE)
-    found = verdict(metrics(labels, np.where(labels == STABLE, 0.9, 0.1), labels))
-    assert found == (
-        "Not enough data: 0 of 20 events, 1.1 of 10 held minutes, 1 of 5 recordings: at most 2.6 "
-        "false alarms a minute, no instability after a stable hold in these recordings; 100 % of "
-        "the samples right (always STABLE: 58 %)."
-    )
-
-
 def test_tares_under_load_are_named():
     found = verdict(metrics(LABELS), LoadedTares(3, 5))
-    assert found.endswith("80 %); tare taken under load in 3 of 5 recordings: see --tare.")
+    assert found.endswith("in 3 of 5 recordings: see --tare.")
     assert "tare" not in verdict(metrics(LABELS), LoadedTares(0, 5))
-
-
-def test_labels_that_are_never_stable():
-    labels = np.full(12_000, UNSTABLE)
-    assert verdict(metrics(LABELS, labels=labels)).startswith(
-        "Not enough data: 0 of 20 events, 0 of 10 held minutes, 1 of 5 recordings: the hand is "
-        "never labelled stable, no instability"
-    )
 
 
 def changed(whole, n_recordings=5, **fields):
@@ -227,21 +188,14 @@ def test_what_slips_are_good_for(pooled, intervals, use):
 
 def test_a_model_that_reports_no_slip_ranks():
     found = verdict(with_slips(slips(found=0.0, rate=0.0)), reports_slips=False)
-    assert found.endswith(
-        ". Slips: none is reported until it is taught (holdfast teach); P(slip) has an AUC of 0.90."
-    )
+    assert "holdfast teach" in found and found.endswith("0.90.")
 
 
 def test_the_sentence_about_slips():
-    assert slip_sentence(slips(found=35.0), rate=(0.5, 1.4)) == (
-        "35 % of 40 slips of fingers found within 0.1 s, 1 (up to 1.4) false alarms a minute of "
-        "held time; not good enough for an automatic reaction to slips: before 1 mm 35 %, 90 % "
-        "needed at 1.5 false alarms a minute."
-    )
+    found = slip_sentence(slips(found=35.0), rate=(0.5, 1.4))
+    assert found.startswith("35 % of 40 slips of fingers found within 0.1 s, 1 (up to 1.4) false")
     assert " (by labels) found within 0.1 s" in slip_sentence(slips(onsets="labels"))
-    assert slip_sentence(slips(n=0, rate=0.0)) == (
-        "none in these recordings, at most 0.3 false alarms a minute of held time."
-    )
+    assert "at most 0.3 false alarms" in slip_sentence(slips(n=0, rate=0.0))
 
 
 @pytest.mark.parametrize(

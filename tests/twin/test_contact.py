@@ -8,10 +8,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import Contact, constants_of, new_contact
-from holdfast.twin.objects import GraspObject, load_objects, object_named, solid
+from holdfast.twin.objects import GraspObject, load_objects, object_named
 from holdfast.twin.skin import Skin
-from holdfast.twin.steps import probe, relief, touch
+from holdfast.twin.steps import probe, touch
 from holdfast.twin.surface import Surface, curved_fingertip
 
 from .grip import GRAVITY, Grip
@@ -158,15 +157,6 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
     shaken(here, seed, 15, check)
 
 
-def test_same_bits_twice() -> None:
-    def run() -> bytes:
-        grip = Grip(object_named("can"), depth=2e-3)
-        grip.settle(0.3)
-        return b"".join(part.tobytes() for part in (*grip.state, grip.bodies))
-
-    assert run() == run()
-
-
 def test_a_fingertip_that_leaves_has_no_state() -> None:
     grip = Grip(BOX)
     grip.settle(0.2)
@@ -177,18 +167,6 @@ def test_a_fingertip_that_leaves_has_no_state() -> None:
     touch(grip.state, grip.constants, grip.bodies, grip.dt)
     for part in grip.state:
         assert not part.any()
-
-
-def test_a_node_that_leaves_has_no_state_and_others_keep_theirs() -> None:
-    grip = Grip(SMOOTH, depth=2e-3)
-    grip.settle(0.2)
-    touched = grip.state.node_forces[0].any(axis=1)
-    grip.bodies[0, 0] += 1e-3
-    touch(grip.state, grip.constants, grip.bodies, grip.dt)
-    left = touched & ~grip.state.node_forces[0].any(axis=1)
-    assert left.any()
-    assert not grip.state.bristles[0, left].any()
-    assert grip.state.bristles[0, touched & ~left, :3].any(axis=1).all()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -248,26 +226,6 @@ def test_a_fingertip_slips_from_its_edge_and_lets_go_between_the_frictions(name:
     assert 0.05 < shares[len(shares) * 4 // 5] < 0.95
 
 
-def test_sliding_friction_is_kinetic_and_texture_makes_it_tremble() -> None:
-    trembling = {}
-    for amplitude in (0.0, 40e-6):
-        grip = Grip(replace(BOX, texture_amplitude=amplitude))
-        grip.object_body[14] = -0.02
-        forces = []
-        for _ in range(1000):
-            touch(grip.state, grip.constants, grip.bodies, grip.dt)
-            grip.object_body[:3] += grip.object_body[12:15] * grip.dt
-            forces.append(grip.state.tip_force[0].copy())
-        assert grip.state.slip_speed[0] == pytest.approx(0.02, rel=0.05)
-        assert grip.state.slipping_share[0] == 1.0
-        drop = BOX.mu_kinetic + (BOX.mu_static - BOX.mu_kinetic) * np.exp(-5)
-        friction = grip.state.tip_force[0, 2] / grip.state.load[0]
-        assert friction == pytest.approx(-drop, rel=0.01)
-        trembling[amplitude] = np.std(forces[500:], axis=0)[0]
-    assert trembling[0.0] < 1e-6
-    assert trembling[40e-6] > 5e-3
-
-
 @pytest.mark.parametrize(("kinetic", "sticks"), [(BOX.mu_kinetic, True), (BOX.mu_static, False)])
 def test_a_slow_pull_sticks_and_slips_where_friction_drops(kinetic: float, sticks: bool) -> None:
     grip = Grip(replace(SMOOTH, mu_kinetic=kinetic))
@@ -305,38 +263,3 @@ def _pushed(item: GraspObject, dt: float) -> tuple[Array, Array, Array]:
             forces.append(grip.state.contact_force.ravel())
             way.append(grip.object_body[:3].copy())
     return np.array(forces), np.array(way), np.array([slid])
-
-
-def test_stiffness_hardens_and_damping_opposes_approach() -> None:
-    patch = flat_patch(3)
-    loads = []
-    for depth, speed in ((1e-3, 0.0), (2e-3, 0.0), (1e-3, -0.05), (1e-3, 0.05), (1e-3, 2.0)):
-        grip = Grip(SMOOTH, depth, surface=patch, angles=(0.0,))
-        grip.bodies[0, 12] = speed
-        touch(grip.state, grip.constants, grip.bodies, grip.dt)
-        loads.append(grip.state.load[0])
-    assert loads[1] / loads[0] == pytest.approx(2 * 1.8 / 1.4, rel=1e-6)
-    assert loads[2:4] == pytest.approx([loads[0] * 1.06, loads[0] * 0.94], rel=1e-6)
-    assert loads[4] == 0
-
-
-def test_texture_moves_the_surface_under_a_node() -> None:
-    one = Surface(np.array([[0.02, 0.0, 0.012]]), np.array([[1.0, 0.0, 0.0]]), np.array([1e-5]))
-    textured, depths = replace(BOX, texture_amplitude=50e-6), []
-    for height in np.linspace(0, 3e-3, 7):
-        constants, state = constants_of(one, textured), new_contact(one, 1)
-        bodies = Grip(SMOOTH, 1e-3, surface=one, angles=(0.0,)).bodies
-        bodies[0, 2] += height
-        touch(state, constants, bodies, 1e-3)
-        point = bodies[0, :3] + bodies[0, 3:12].reshape(3, 3) @ one.nodes[0]
-        depth = 1e-3 - relief(solid(textured), *point)
-        assert state.load[0] == pytest.approx(1e7 * 1e-5 * depth * (1 + 400 * depth), rel=1e-6)
-        depths.append(depth)
-    assert np.ptp(depths) > 50e-6
-
-
-def test_a_new_contact_touches_nothing() -> None:
-    state = new_contact(curved_fingertip(), 4)
-    assert isinstance(state, Contact)
-    assert state.node_forces.shape == (4, len(curved_fingertip().nodes), 3)
-    assert not any(part.any() for part in state)

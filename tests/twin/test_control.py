@@ -1,16 +1,14 @@
 import numpy as np
 import pytest
 
-from holdfast.twin import control as module
 from holdfast.twin.control import (
     COMPENSATION,
     GLITCH_ERROR,
     GLITCH_TICKS,
     PROPORTIONAL,
-    TORQUE_NOISE,
     draw_controller,
 )
-from holdfast.twin.hand import JOINTS, RATE, SUBSTEPS
+from holdfast.twin.hand import JOINTS
 from holdfast.twin.steps import DERIVATIVE, ENCODER_STEP, TORQUE_LIMIT, TORQUE_STEP, control
 
 PERIOD = 1 / 350
@@ -35,16 +33,6 @@ def torques(controller, joints, target, bias=0.0, tick=0):
     control(controller, tick, wide, np.full(16, bias), wanted, PERIOD, out)
     assert (out[16:] == 7.0).all()  # the object's are not written
     return out[:16]
-
-
-def test_runs_fast_enough_for_the_hand():
-    assert RATE * SUBSTEPS / module.STEPS_PER_CONTROL >= 300
-
-
-def test_the_same_seed_gives_the_same_controller():
-    for one, other in zip(draw(3), draw(3), strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert (draw(3).noise != draw(4).noise).all()
 
 
 def test_a_set_point_off_by_a_little_gives_a_proportional_torque(plain):
@@ -83,12 +71,6 @@ def test_angles_come_in_steps_of_the_encoder(plain):
     np.testing.assert_allclose(plain.last, 0.0)
     torques(plain, 0.6 * ENCODER_STEP, 0.1)
     np.testing.assert_allclose(plain.last, ENCODER_STEP)
-
-
-def test_noise_has_the_documented_size():
-    drawn = draw()
-    assert drawn.noise.std() == pytest.approx(TORQUE_NOISE, rel=0.02)
-    assert drawn.noise.mean() == pytest.approx(0.0, abs=0.02 * TORQUE_NOISE)
 
 
 class TestGlitches:

@@ -1,12 +1,10 @@
 """A skin whose nodes are coupled, against Hertz, Cattaneo and Mindlin, and its own equations."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import constants_of, nearness_of, new_contact
+from holdfast.twin.contact import constants_of, nearness_of
 from holdfast.twin.objects import object_named
 from holdfast.twin.skin import COUPLED, COUPLED_PITCH
 from holdfast.twin.steps import MAX_COUPLED, probe, relief, touch
@@ -132,23 +130,6 @@ def test_held_at_rest_without_creep() -> None:
     np.testing.assert_allclose(grip.state.wrench[:3], weight, atol=1e-3)
 
 
-def test_half_the_step_gives_the_same() -> None:
-    """One sweep in a step is enough: forces in a fast push, of which the edge slips."""
-    runs = []
-    for dt in (1e-3, 0.5e-3):
-        grip, forces = coupled_grip("can", 2.5e-3, dt), []
-        for _ in range(round(0.4 / dt)):
-            grip.step(spin=False)
-        for k in range(round(0.3 / dt)):
-            time = (k + 0.5) * dt
-            push = 2.5 * np.sin(np.pi * time / 0.15) if time < 0.15 else 0.0
-            grip.step((0.0, push, 0.0), spin=False)
-            if (k + 1) % round(0.01 / dt) == 0:
-                forces.append(grip.state.contact_force.ravel())
-        runs.append(np.array(forces))
-    assert np.abs(runs[0] - runs[1]).max() < 0.02 * np.abs(runs[1]).max()
-
-
 def test_a_fingertip_that_leaves_has_no_state_and_comes_back() -> None:
     grip = coupled_grip("can")
     touch(grip.state, grip.constants, grip.bodies, grip.dt)
@@ -168,13 +149,5 @@ def test_a_matrix_of_other_nodes_is_refused() -> None:
     grip = coupled_grip("can")
     fine = fingertip_of(coupled=True).nodes[: MAX_COUPLED // 2]
     for nearness in (np.zeros((1, 1)), np.ones((len(fine), len(fine)))):
-        with pytest.raises(ValueError, match="nearness: a row for each node expected, and at most"):
+        with pytest.raises(ValueError, match="nearness"):
             touch(grip.state, grip.constants._replace(nearness=nearness), grip.bodies, grip.dt)
-
-
-def test_the_skins_of_old_profiles_are_not_coupled() -> None:
-    item = replace(object_named("can"), texture_amplitude=0.0)
-    constants = constants_of(fingertip_of(coupled=False), item)
-    assert constants.nearness.shape == (1, 1)
-    assert constants.skin[9] == 0.0
-    assert new_contact(fingertip_of(coupled=False), 1).node_forces.shape == (1, 158, 3)

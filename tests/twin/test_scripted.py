@@ -21,19 +21,23 @@ def test_an_open_hand_touches_nothing():
     assert {*recording.truth.hand["phase"]} == {Phase.FREE}
 
 
-def test_a_pull_slides_and_a_nudge_slides_less():
-    pulled, nudged = perform(CAN, "pull", 2, 12.0), perform(CAN, "nudge", 2, 8.0)
-    assert [x["kind"] for x in pulled.metadata["slip_events"]] == ["creep", "twist"]
+@pytest.fixture(scope="module")
+def pulled():
+    return perform(CAN, "pull", 3, 9.0)
+
+
+def test_a_pull_slides_and_a_nudge_slides_less(pulled):
+    nudged = perform(CAN, "nudge", 2, 8.0)
+    assert [x["kind"] for x in pulled.metadata["slip_events"]][:2] == ["creep", "twist"]
     assert n_slips(pulled) > n_slips(nudged)
     assert Phase.DISTURBED in nudged.truth.hand["phase"]
 
 
-def test_a_script_keeps_to_its_time():
-    recording = perform(CAN, "pull", 3, 9.0)
-    assert len(recording.metadata["slip_events"]) == 3
-    last = max(x["end"] for x in recording.metadata["slip_events"])
-    assert last <= recording.metadata["locked_at"] + 9.0 - scripted.LAST_ACTION + 0.01
-    open_at_end = recording.truth.hand["phase"][-round(4 * recording.rate) :]
+def test_a_script_keeps_to_its_time(pulled):
+    assert len(pulled.metadata["slip_events"]) == 3
+    last = max(x["end"] for x in pulled.metadata["slip_events"])
+    assert last <= pulled.metadata["locked_at"] + 9.0 - scripted.LAST_ACTION + 0.01
+    open_at_end = pulled.truth.hand["phase"][-round(4 * pulled.rate) :]
     assert {*open_at_end} == {Phase.FREE}
 
 
@@ -64,8 +68,5 @@ def test_a_tool_knocks_once_in_each_part_of_the_time(monkeypatch):
 
 
 def test_an_unknown_action_is_refused():
-    with pytest.raises(ValueError) as failure:
+    with pytest.raises(ValueError, match="'juggle'"):
         perform(CAN, "juggle", 1, 5.0)
-    assert str(failure.value) == (
-        "unknown action 'juggle'; there are open, hold, carry, pull, push, tap, knock, nudge"
-    )

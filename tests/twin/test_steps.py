@@ -1,7 +1,5 @@
 """The binding of the steps in C: what it refuses."""
 
-import re
-
 import numpy as np
 import pytest
 
@@ -61,74 +59,70 @@ def on_path(first=(12, 0, 4, 8), n=25):
 
 
 REFUSED = {
-    "type": (lambda: steps.probe(solid(CAN).astype("f4"), 0, 0, 0),
-             TypeError, "solid: float64 expected, the format f given"),
-    "byte order": (lambda: steps.probe(solid(CAN).astype(">f8"), 0, 0, 0),
-                   TypeError, "solid: float64 expected, the format >d given"),
-    "axes": (lambda: steps.probe(solid(CAN)[None], 0, 0, 0),
-             ValueError, "solid: 1 axes expected, 2 given"),
-    "length": (lambda: steps.probe(solid(CAN)[:-1].copy(), 0, 0, 0),
-               ValueError, "solid: axis 0 has the length 15, 16 expected"),
-    "number": (lambda: steps.probe(solid(CAN), 0, "x", 0),
-               TypeError, "must be real number, not str"),
-    "count": (lambda: steps.probe(solid(CAN)), TypeError, "probe: 4 arguments expected, 1 given"),
-    "not contiguous": (lambda: steps.probe(np.zeros(32)[::2], 0, 0, 0),
-                       ValueError, "ndarray is not C-contiguous"),
-    "no array": (lambda: steps.probe(None, 0, 0, 0),
-                 TypeError, "a bytes-like object is required, not 'NoneType'"),
-    "points": (lambda: steps.distances(solid(CAN), np.zeros((3, 3)), np.zeros(2)),
-               ValueError, "out: axis 0 has the length 2, 3 expected"),
-    "read-only": (lambda: touched(state=fields(wrench=lambda old: np.frombuffer(bytes(48)))),
-                  ValueError, "buffer source array is read-only"),
-    "no field": (lambda: touched(constants=lambda old: old.nodes),
-                 AttributeError, "'numpy.ndarray' object has no attribute 'nodes'"),
-    "nodes": (lambda: touched(constants=fields(nodes=lambda old: old[1:].copy())),
-              ValueError, "nodes: axis 0 has the length 157, 158 expected"),
-    "no tips": (lambda: touched(state=fields(bristles=lambda old: old[:0])),
-                ValueError, "bristles: axis 0 has the length 0"),
-    "bodies": (lambda: touched(bodies=lambda old: old[:-1].copy()),
-               ValueError, "bodies: a row for each fingertip and one for the object expected"),
-    "link": (lambda: bodies_of(tips=np.full(4, 99, np.intc)),
-             ValueError, "tips, object_body, roots: a body that the model does not have"),
-    "links": (lambda: bodies_of(tips=np.arange(4.0)),
-              TypeError, "tips: int32 expected, the format d given"),
-    "object": (lambda: bodies_of(object_body=-1),
-               ValueError, "tips, object_body, roots: a body that the model does not have"),
-    "joints": (lambda: controlled(joints=np.zeros(15)),
-               ValueError, "joints, bias or torques: at least 16 numbers expected"),
-    "torques": (lambda: controlled(torques=np.zeros(15)),
-                ValueError, "joints, bias or torques: at least 16 numbers expected"),
-    "errors": (lambda: controlled(errors=np.zeros((0, 16))),
-               ValueError, "errors: axis 0 has the length 0"),
-    "tick": (lambda: controlled(tick=-1),
-             ValueError, "a number of a step or an axis is out of range"),
-    "large tick": (lambda: controlled(tick=2**63), OverflowError, "int too big to convert"),
-    "axis": (lambda: steps.tremor_at(TREMOR, 0.0, 3),
-             ValueError, "a number of a step or an axis is out of range"),
-    "physics": (lambda: steps.apply_all(None, 0, 0, HALF, None, 0.0),
-                AttributeError, "'NoneType' object has no attribute 'steps'"),
-    "line": (lambda: read(line=0),
-             ValueError, "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel"),
-    "drawn": (lambda: read(90),
-              ValueError, "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel"),
-    "readings": (lambda: read(limits=np.ones(3, np.uint16)),
-                 TypeError, "limits: float64 expected, the format H given"),
-    "finger": (lambda: on_path((12, 0, 4, 13)),
-               ValueError, "first, grid: joints of the hand and two points of a path expected"),
-    "path": (lambda: on_path(n=1),
-             ValueError, "first, grid: joints of the hand and two points of a path expected"),
-    "pose": (lambda: steps.hold_wrench(BODY, np.zeros(3), 1.0, 0.0, TREMOR, 0.0, 0.0),
-             ValueError, "anchor: axis 0 has the length 3, 12 expected"),
-}  # fmt: skip
+    "type": (lambda: steps.probe(solid(CAN).astype("f4"), 0, 0, 0), TypeError, "solid"),
+    "byte order": (lambda: steps.probe(solid(CAN).astype(">f8"), 0, 0, 0), TypeError, "solid"),
+    "axes": (lambda: steps.probe(solid(CAN)[None], 0, 0, 0), ValueError, "solid"),
+    "length": (lambda: steps.probe(solid(CAN)[:-1].copy(), 0, 0, 0), ValueError, "solid"),
+    "number": (lambda: steps.probe(solid(CAN), 0, "x", 0), TypeError, "real number"),
+    "count": (lambda: steps.probe(solid(CAN)), TypeError, "probe"),
+    "not contiguous": (lambda: steps.probe(np.zeros(32)[::2], 0, 0, 0), ValueError, "contiguous"),
+    "no array": (lambda: steps.probe(None, 0, 0, 0), TypeError, "bytes-like"),
+    "points": (
+        lambda: steps.distances(solid(CAN), np.zeros((3, 3)), np.zeros(2)),
+        ValueError,
+        "out",
+    ),
+    "read-only": (
+        lambda: touched(state=fields(wrench=lambda old: np.frombuffer(bytes(48)))),
+        ValueError,
+        "read-only",
+    ),
+    "no field": (lambda: touched(constants=lambda old: old.nodes), AttributeError, "nodes"),
+    "nodes": (
+        lambda: touched(constants=fields(nodes=lambda old: old[1:].copy())),
+        ValueError,
+        "nodes",
+    ),
+    "no tips": (
+        lambda: touched(state=fields(bristles=lambda old: old[:0])),
+        ValueError,
+        "bristles",
+    ),
+    "bodies": (lambda: touched(bodies=lambda old: old[:-1].copy()), ValueError, "bodies"),
+    "link": (
+        lambda: bodies_of(tips=np.full(4, 99, np.intc)),
+        ValueError,
+        "tips, object_body, roots",
+    ),
+    "links": (lambda: bodies_of(tips=np.arange(4.0)), TypeError, "tips"),
+    "object": (lambda: bodies_of(object_body=-1), ValueError, "tips, object_body, roots"),
+    "joints": (lambda: controlled(joints=np.zeros(15)), ValueError, "joints, bias or torques"),
+    "torques": (lambda: controlled(torques=np.zeros(15)), ValueError, "joints, bias or torques"),
+    "errors": (lambda: controlled(errors=np.zeros((0, 16))), ValueError, "errors"),
+    "tick": (lambda: controlled(tick=-1), ValueError, "out of range"),
+    "large tick": (lambda: controlled(tick=2**63), OverflowError, "too big"),
+    "axis": (lambda: steps.tremor_at(TREMOR, 0.0, 3), ValueError, "out of range"),
+    "physics": (lambda: steps.apply_all(None, 0, 0, HALF, None, 0.0), AttributeError, "steps"),
+    "line": (lambda: read(line=0), ValueError, "line"),
+    "drawn": (lambda: read(90), ValueError, "line"),
+    "readings": (lambda: read(limits=np.ones(3, np.uint16)), TypeError, "limits"),
+    "finger": (lambda: on_path((12, 0, 4, 13)), ValueError, "first, grid"),
+    "path": (lambda: on_path(n=1), ValueError, "first, grid"),
+    "pose": (
+        lambda: steps.hold_wrench(BODY, np.zeros(3), 1.0, 0.0, TREMOR, 0.0, 0.0),
+        ValueError,
+        "anchor",
+    ),
+}
 
 
 @pytest.mark.parametrize(("call", "error", "message"), REFUSED.values(), ids=REFUSED)
 def test_what_does_not_fit_is_refused(call, error, message):
-    with pytest.raises(error, match=f"^{re.escape(message)}$"):
+    with pytest.raises(error, match=message):
         call()
 
 
-def test_an_index_is_a_number_that_the_model_has():
+def test_what_fits_is_taken():
     touched()
     controlled()
     bodies_of()

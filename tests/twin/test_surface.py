@@ -67,11 +67,3 @@ def test_area_and_its_moments_do_not_depend_on_the_elements(pitch: float) -> Non
     np.testing.assert_allclose(
         other.areas @ other.nodes, SKIN.areas @ SKIN.nodes, atol=SKIN.areas.sum() * 3e-4
     )
-
-
-def test_same_bits_twice_and_read_only() -> None:
-    again = curved_fingertip.__wrapped__()
-    for one, other in zip(SKIN, again, strict=True):
-        assert one.tobytes() == other.tobytes()
-        with pytest.raises(ValueError, match="read-only"):
-            one[0] = 0

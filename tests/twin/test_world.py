@@ -4,7 +4,7 @@ import pytest
 from holdfast.contact import Phase
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import closing_path, object_pose
-from holdfast.twin.hand import RATE, SUBSTEPS, TIMESTEP, HandModel
+from holdfast.twin.hand import RATE, TIMESTEP, HandModel
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import Disturbance, draw_tremor
 from holdfast.twin.profile import profile
@@ -48,12 +48,6 @@ def test_begins_as_the_object_is_put_there():
     assert np.arctan2(made.bodies[-1, 6], made.bodies[-1, 3]) == pytest.approx(turn + 0.1)
     assert not made.loads.any()
     assert made.slip == 0.0
-
-
-def test_an_advance_is_one_sample():
-    made = run(world(), 0.1)
-    assert made.hand.data.time == pytest.approx(0.1)
-    assert pytest.approx(1 / RATE) == SUBSTEPS * TIMESTEP
 
 
 def test_the_operator_holds_the_object_before_an_open_hand():
@@ -102,19 +96,3 @@ def test_closed_fingers_press_and_hold_it_alone():
     assert made.outside[2] < -0.5
     assert not made.outside[:2].any()
     assert (made.loads != pressed).any()
-
-
-def test_each_push_begins_where_the_object_is():
-    made = run(world(), 0.3, hold=0.0)  # falls
-    run(made, 1 / RATE, hold=0.0, disturbance=0)
-    assert made._origin[2] < -0.1
-    first = made._origin.copy()
-    run(made, 2 / RATE, hold=0.0, disturbance=0)
-    np.testing.assert_array_equal(made._origin, first)
-
-
-def test_seeds():
-    one, same, other = (run(world(seed), 0.5, depth=0.01) for seed in (0, 0, 1))
-    np.testing.assert_array_equal(one.hand.data.qpos, same.hand.data.qpos)
-    np.testing.assert_array_equal(one.contact.tips, same.contact.tips)
-    assert (one.hand.data.qpos != other.hand.data.qpos).any()

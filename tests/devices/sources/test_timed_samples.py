@@ -94,14 +94,6 @@ def test_markers_come_after_the_samples_of_their_time():
     assert [item.time for item in got] == sorted(item.time for item in got)
 
 
-def test_markers_outside_are_at_the_ends():
-    markers = ((-1e9, "before"), (1e9, "after"))
-    got = list(timed_samples([hand(20, markers=markers)]))
-    found = {item.notice: item.time for item in got if item.notice}
-    times = [item.time for item in got if item.samples]
-    assert found == {"marker: before": times[0], "marker: after": times[-1]}
-
-
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])
 def test_markers_of_a_file_occur_once_and_in_place(tmp_path, suffix):
     markers = tuple((0.1 * k + 0.003, f"m{k}") for k in range(45))

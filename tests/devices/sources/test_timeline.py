@@ -1,5 +1,4 @@
 import math
-import re
 
 import pytest
 from hypothesis import given
@@ -203,7 +202,7 @@ def test_a_clock_that_runs_away_is_late():
 
 @pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf, 1e300, -1e300, 1e11])
 def test_a_stamp_that_is_not_finite_is_refused(wrong):
-    with pytest.raises(ValueError, match=re.escape(f"a time in seconds expected, {wrong} given")):
+    with pytest.raises(ValueError, match=f"{wrong}".replace("+", r"\+")):
         Timeline().stamp(wrong, 0.0)
 
 

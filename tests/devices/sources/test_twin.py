@@ -1,12 +1,10 @@
 import itertools
-import json
 import subprocess
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -14,7 +12,6 @@ from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
 from holdfast.devices.sources.twin import GRASP_ATTEMPTS, AskedTwin, Twin, grasp_of, write
 from holdfast.devices.uri import parse
-from holdfast.io import load_recording
 from holdfast.io.stickers import picture_stamps
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -185,64 +182,24 @@ def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
     assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == [10, 20]
 
 
-def test_a_process_is_ended_with_the_source(monkeypatch):
-    monkeypatch.setattr(module, "simulate", lambda _: ball())
-    with open_source(BALL, loop=True) as source:
-        process = source._simulator._process
-    assert process.returncode is not None
-
-
-def test_the_program_of_the_process(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "simulate", lambda _: ball())
-    write(json.dumps(asdict(Grasp("ball", 1, 1, seed=3))), str(tmp_path / "a.parquet"))
-    assert load_recording(tmp_path / "a.parquet").digest == ball().digest
-
-
-def test_metadata_are_plain(monkeypatch):
-    monkeypatch.setattr(module, "simulate", lambda _: ball())
-    with open_source(BALL) as source:
-        assert msgspec.json.decode(msgspec.json.encode(source.metadata)) == source.metadata
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("twin:?object=brick", "twin:?object=brick: no object 'brick'; there are ball, "),
-        (
-            "twin:?profile=wild",
-            "twin:?profile=wild: unknown profile 'wild'; there are coupled, finger-gentle, "
-            "finger-reference, finger-vigorous, gentle, long-hold, reference, slips, vigorous",
-        ),
-        (
-            "twin:?case=3",
-            "twin:?case=3: case 1 or 2 and a repeat of at least 1 expected, 3 and 1 given",
-        ),
-        (
-            "twin:?repeat=0",
-            "twin:?repeat=0: case 1 or 2 and a repeat of at least 1 expected, 2 and 0 given",
-        ),
-        ("twin:?seed=-1", "twin:?seed=-1: seed=1, a whole number, expected, '-1' given"),
-        ("twin:?seed=", "twin:?seed=: seed=1, a whole number, expected, '' given"),
-        ("twin:?server=yes", "twin:?server=yes: server=true or false expected, 'yes' given"),
-        (
-            "twin:?attempt=2",
-            "twin:?attempt=2: unknown parameter attempt; there are object, seed, case, repeat, "
-            "profile, server",
-        ),
-        ("twin:can", "twin:can: twin:?object=can&seed=1 expected, without a path"),
-        ("twin://can", "twin://can: twin:?object=can&seed=1 expected, without a path"),
+        ("twin:?object=brick", "'brick'; there are ball"),
+        ("twin:?profile=wild", "'wild'; there are coupled"),
+        ("twin:?case=3", "3 and 1"),
+        ("twin:?repeat=0", "2 and 0"),
+        ("twin:?seed=-1", "'-1'"),
+        ("twin:?seed=", "''"),
+        ("twin:?server=yes", "'yes'"),
+        ("twin:?attempt=2", "unknown parameter attempt; there are object"),
+        ("twin:can", "twin:can"),
+        ("twin://can", "twin://can"),
     ],
 )
 def test_invalid_parameters(text, message):
-    with pytest.raises(ValueError) as error:
+    with pytest.raises(ValueError, match=message):
         open_source(text)
-    assert str(error.value).startswith(message)
-
-
-@pytest.mark.parametrize("speed", [-1.0, np.nan])
-def test_an_invalid_speed(speed):
-    with pytest.raises(ValueError, match="a speed of at least 0 expected"):
-        open_source("twin:", speed=speed)
 
 
 def test_a_twin_does_what_it_is_asked_and_then_is_silent(monkeypatch, tmp_path):

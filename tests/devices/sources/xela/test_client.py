@@ -1,7 +1,7 @@
 import socket
 import threading
 import time
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, contextmanager, suppress
 
 import numpy as np
 import pytest
@@ -67,17 +67,11 @@ class TestOpening:
             np.testing.assert_array_equal(arrival.samples["thumb"], counts(16, k))
             assert arrival.received <= time.monotonic()
 
-    def test_garbage_before_the_first_packet_does_not_matter(self):
-        words = [WELCOME, "?", '{"message": 1', patch(3)]
-        with server(words) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
-            assert source.read(PATIENCE).time == START + 3 * PERIOD
-
     def test_notices_about_a_sensor_come_first(self):
         with server([NEW]) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
             first = source.read(PATIENCE)
         assert list(first.samples) == ["finger1"]
-        text = "finger1: the layout of a uSPa11 with 1 taxels is not known"
-        assert first.notices[0].startswith(text)
+        assert "uSPa11" in first.notices[0]
         assert source.metadata["server_version"] == "1.8.0b_200801"
 
     def test_it_can_be_opened_again(self):
@@ -87,72 +81,37 @@ class TestOpening:
                 with source:
                     assert source.read(PATIENCE).time == START + PERIOD
 
-    def test_auto_finds_this_machine(self):
-        with server([patch(1)]) as (port, _), open_source(f"xela://auto:{port}") as source:
-            assert list(source.sensors) == ["finger1"]
-
     def test_nothing_listens(self):
         port = free_port()
-        with pytest.raises(SourceError) as refusal:
+        with pytest.raises(SourceError, match=f":{port}; .*xela://auto; .*`holdfast play`"):
             open_source(f"xela://127.0.0.1:{port}").open()
-        assert str(refusal.value) == (
-            f"no server listens at 127.0.0.1:{port}; xela_server binds the address of the network "
-            "card: try xela://auto; without a hand, use `holdfast play`"
-        )
-
-    def test_another_server_listens(self):
-        with socket.create_server(("127.0.0.1", 0)) as other:
-            port = other.getsockname()[1]
-
-            def answer():
-                connection, _ = other.accept()
-                with connection:
-                    connection.recv(4096)
-                    connection.sendall(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n")
-
-            thread = threading.Thread(target=answer)
-            thread.start()
-            with pytest.raises(SourceError) as refusal:
-                open_source(f"xela://127.0.0.1:{port}").open()
-            thread.join()
-        assert str(refusal.value) == (
-            f"the server at 127.0.0.1:{port} is no XELA server: "
-            "server rejected WebSocket connection: HTTP 404"
-        )
 
     def test_a_host_that_cannot_be_reached(self, monkeypatch):
         def refuse(*_, **__):
             raise OSError("No route to host")
 
         monkeypatch.setattr(socket, "create_connection", refuse)
-        with pytest.raises(SourceError) as refusal:
+        with pytest.raises(SourceError, match="No route to host"):
             open_source("xela://10.0.0.7").open()
-        assert str(refusal.value) == "10.0.0.7:5000 cannot be reached: No route to host"
 
     @pytest.mark.parametrize("first", [[], [WELCOME]])
     def test_no_samples_come(self, first, monkeypatch):
         monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
-        with server(first) as (port, _), pytest.raises(SourceError) as refusal:
+        with server(first) as (port, _), pytest.raises(SourceError, match="no samples"):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value) == (
-            f"connected to 127.0.0.1:{port}, but no samples came in 0.3 s: is it a XELA server, "
-            "with its sensors plugged in?"
-        )
 
     def test_only_invalid_packets_come(self, monkeypatch):
         monkeypatch.setattr(module, "XELA_OPEN_TIMEOUT", 0.3)
         broken = text(1, [sensor(counts(16), data="?")])
-        with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError) as refusal:
+        with server([WELCOME, broken]) as (port, _), pytest.raises(SourceError, match="sensor 1"):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value) == (
-            f"127.0.0.1:{port} sends invalid packets: sensor 1: four hexadecimal digits a "
-            "number expected in data, with commas between"
-        )
 
     def test_the_server_closes_the_connection(self):
-        with server(broken=True) as (port, _), pytest.raises(SourceError) as refusal:
+        with (
+            server(broken=True) as (port, _),
+            pytest.raises(SourceError, match="closed the connection"),
+        ):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
-        assert str(refusal.value).startswith(f"127.0.0.1:{port} closed the connection: ")
 
     @pytest.mark.parametrize(
         ("query", "message"),
@@ -179,7 +138,6 @@ class TestReading:
         assert sum(a.n_refused for a in arrivals) == 3
         notices = [notice for a in arrivals for notice in a.notices]
         assert len(notices) == 2
-        assert notices[0].endswith("behind the clock of this machine: old data?")
         assert notices[1].startswith("invalid packet: ")
 
     def test_repeats_are_silence_too(self, quick):
@@ -193,20 +151,11 @@ class TestReading:
                     notices += arrival.notices
         assert notices[1:] == ["no new sample for 0.05 s"]
 
-    @pytest.mark.parametrize(
-        ("ahead", "notices"),
-        [
-            (-3600 * 24, ("the stamps of the device are 24 h behind the clock of this machine: old "
-                          "data?",)),
-            (600, ("the stamps of the device are 10 min ahead of the clock of this machine: is its "
-                   "clock set?",)),
-            (-30, ()),
-        ],
-    )  # fmt: skip
-    def test_stamps_of_another_time_give_a_notice(self, ahead, notices):
-        first = patch(1, time=time.time() + ahead)
+    def test_stamps_of_another_time_give_a_notice(self):
+        first = patch(1, time=time.time() - 3600 * 24)
         with server([first]) as (port, _), open_source(f"xela://127.0.0.1:{port}") as source:
-            assert source.read(1.0).notices == notices
+            (notice,) = source.read(1.0).notices
+        assert "24 h behind" in notice
 
 
 def test_a_source_that_is_closed_gives_nothing():
@@ -265,10 +214,6 @@ class TestReconnecting:
             assert until(source, lambda a: a.samples)[-1].time == START + 7 * PERIOD
 
 
-def refuse(place):
-    raise ConnectionRefusedError
-
-
 @pytest.mark.parametrize("n_headers", [0, 200_000])
 def test_a_server_that_answers_before_the_request(n_headers):
     """The library's own check of its state fails then, by chance."""
@@ -288,27 +233,35 @@ def test_a_server_that_answers_before_the_request(n_headers):
         thread = threading.Thread(target=answer)
         thread.start()
         for _ in range(5):
-            with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA"):
+            with pytest.raises(SourceError, match="no XELA server"):
                 open_source(f"xela://127.0.0.1:{port}").open()
         thread.join()
 
 
-@pytest.mark.parametrize("location", ["ws://127.0.0.1:{other}/", "ws://localhost:{port}/", "/b"])
-def test_redirects_are_not_followed(location):
-    """A server that redirects its clients to another one."""
-    with server([patch(1)]) as (other, _), socket.create_server(("127.0.0.1", 0)) as listener:
-        port = listener.getsockname()[1]
-        where = location.format(other=other, port=port)
+@contextmanager
+def answering(head):
+    """The port of a server that answers its first request."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
 
-        def redirect():
+        def answer():
             connection, _ = listener.accept()
             with connection:
                 connection.recv(1 << 16)
-                head = f"HTTP/1.1 302 Found\r\nLocation: {where}\r\nContent-Length: 0\r\n\r\n"
-                connection.sendall(head.encode())
+                connection.sendall(f"HTTP/1.1 {head}\r\nContent-Length: 0\r\n\r\n".encode())
 
-        thread = threading.Thread(target=redirect)
+        thread = threading.Thread(target=answer)
         thread.start()
-        with pytest.raises(SourceError, match=f"the server at 127.0.0.1:{port} is no XELA server"):
-            open_source(f"xela://127.0.0.1:{port}").open()
+        yield listener.getsockname()[1]
         thread.join()
+
+
+@pytest.mark.parametrize(
+    "head", ["404 Not Found", "302 Found\r\nLocation: /b", "302 Found\r\nLocation: ws://{other}/"]
+)
+def test_another_server_is_no_xela_server_and_redirects_are_not_followed(head):
+    with (
+        server([patch(1)]) as (other, _),
+        answering(head.format(other=f"127.0.0.1:{other}")) as port,
+        pytest.raises(SourceError, match=f"127.0.0.1:{port} is no XELA server"),
+    ):
+        open_source(f"xela://127.0.0.1:{port}").open()

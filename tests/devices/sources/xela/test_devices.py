@@ -3,46 +3,10 @@ import pytest
 
 from holdfast.devices.sources.xela.devices import xela_devices
 from holdfast.errors import SourceError
-from holdfast.sensors import hand, sensor
+from holdfast.sensors import sensor
 from holdfast.sensors.xela_models import flat_grid
 
 TIP = ("uSCuAH", 30)
-
-
-@pytest.mark.parametrize("model", ["XR23AHLCPP", "XR23AHRCPP", "xr23ahrcpp"])
-def test_a_whole_hand_becomes_its_modules(model):
-    allegro = hand("allegro-uskin")
-    device = xela_devices({1: (model, 368)}, {})[1]
-    assert device.n_taxels == 368
-    assert device.modules == {name: module.sensor for name, module in allegro.modules.items()}
-    readings = np.arange(368 * 3).reshape(368, 3)
-    parts, expected = device.split(readings), allegro.split(readings)
-    assert parts.keys() == expected.keys()
-    for name, part in parts.items():
-        np.testing.assert_array_equal(part, expected[name])
-    assert device.notices == ()
-
-
-@pytest.mark.parametrize(
-    ("model", "name"),
-    [
-        ("uSCuAH", "uskin-curved"),
-        ("USCUAH", "uskin-curved"),
-        ("XR1944", "uskin-4x4"),
-        ("XR1844", "uskin-4x4"),
-        ("uSPa44", "uskin-4x4"),
-        ("uSFtAH", "uskin-4x4"),
-        ("uSPa46", "uskin-4x6"),
-        ("xr1946", "uskin-4x6"),
-    ],
-)
-def test_separate_sensors_that_are_built_in(model, name):
-    built_in = sensor(name)
-    device = xela_devices({1: (model, built_in.n_taxels)}, {})[1]
-    assert device.modules == {"finger1": built_in}
-    assert device.notices == ()
-    readings = np.zeros((built_in.n_taxels, 3))
-    assert device.split(readings)["finger1"] is readings
 
 
 def test_names():
@@ -58,15 +22,7 @@ def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     device = xela_devices({1: (model, 15)}, {})[1]
     (flat,) = device.modules.values()
     assert (flat.name, flat.n_taxels, flat.range) == (model.lower(), 15, (0.0, 65535.0))
-    assert device.notices == (
-        f"finger1: the layout of a {model} with 15 taxels is not known; a flat grid is assumed "
-        "(sensor=FILE.json in the URI gives another)",
-    )
-
-
-def test_a_model_without_a_layout_with_the_taxels_of_a_built_in_sensor():
-    (flat,) = xela_devices({1: ("uspr-dsf", 30)}, {})[1].modules.values()
-    assert (flat.name, flat.n_taxels) == ("uspr-dsf", 30)
+    assert "sensor=FILE.json" in device.notices[0]
 
 
 def test_without_a_model():
@@ -79,10 +35,7 @@ def test_without_a_model():
 def test_without_a_model_but_with_the_taxels_of_a_built_in_sensor(name):
     device = xela_devices({1: ("", sensor(name).n_taxels)}, {})[1]
     assert device.modules == {"finger1": sensor(name)}
-    assert device.notices == (
-        f"finger1: the layout of a sensor without a model with {sensor(name).n_taxels} taxels is "
-        f"not known; {name} is assumed (sensor=FILE.json in the URI gives another)",
-    )
+    assert f"{name} is assumed" in device.notices[0]
 
 
 def test_a_given_sensor_is_taken_where_it_fits():
@@ -114,47 +67,14 @@ def test_two_hands_have_names_of_their_own():
 @pytest.mark.parametrize(
     ("found", "names", "given", "text"),
     [
-        (
-            {1: ("uSCuAH", 24)},
-            {},
-            None,
-            "sensor 1: 24 taxels given, 30 expected (uSCuAH: uskin-curved); sensor=FILE.json in "
-            "the URI gives another layout",
-        ),
-        (
-            {3: ("XR23AHRCPP", 240)},
-            {},
-            None,
-            "sensor 3: 240 taxels given, 368 expected (XR23AHRCPP: allegro-uskin); "
-            "sensor=FILE.json in the URI gives another layout",
-        ),
-        (
-            {1: TIP},
-            {2: "index"},
-            None,
-            "fingers= names 2; separate sensors have names, the server has 1 (uSCuAH)",
-        ),
-        (
-            {1: ("XR23AHRCPP", 368)},
-            {1: "thumb"},
-            None,
-            "fingers= names 1; separate sensors have names, the server has 1 (XR23AHRCPP)",
-        ),
-        (
-            {1: TIP},
-            {},
-            flat_grid("mine", 15),
-            "sensor= has 15 taxels and fits no sensor of the server: 1 (30 taxels)",
-        ),
-        (
-            {1: TIP, 2: TIP},
-            {1: "finger2"},
-            None,
-            "two modules have the same name: finger2, finger2; fingers= gives other names",
-        ),
+        ({1: ("uSCuAH", 24)}, {}, None, "24 taxels given, 30 expected .*sensor=FILE.json"),
+        ({3: ("XR23AHRCPP", 240)}, {}, None, "240 taxels given, 368 expected"),
+        ({1: TIP}, {2: "index"}, None, "fingers= names 2"),
+        ({1: ("XR23AHRCPP", 368)}, {1: "thumb"}, None, "fingers= names 1"),
+        ({1: TIP}, {}, flat_grid("mine", 15), "15 taxels"),
+        ({1: TIP, 2: TIP}, {1: "finger2"}, None, "finger2"),
     ],
 )
 def test_what_does_not_fit(found, names, given, text):
-    with pytest.raises(SourceError) as refusal:
+    with pytest.raises(SourceError, match=text):
         xela_devices(found, names, given)
-    assert str(refusal.value) == text

@@ -68,10 +68,10 @@ def test_what_is_no_log(tmp_path):
     for text in ("", '{"data": [1, 2, 3]}\n', "{" + " " * 2**21, '{"message": 1, "time": 1}\n'):
         path.write_text(text)
         assert not messages.can_read(path)
-    with pytest.raises(RecordingError, match="no log of XELA messages in"):
+    with pytest.raises(RecordingError, match="no log"):
         messages.parts(tmp_path)
-    with pytest.raises(RecordingError, match="has no samples; messages of a XELA server expected"):
+    with pytest.raises(RecordingError, match="no samples"):
         list(messages.read(path))
     path.write_text("\n".join(lines(2)) + "\n{" + " " * 2**20)
-    with pytest.raises(RecordingError, match="a line of more than 1048576 characters given"):
+    with pytest.raises(RecordingError, match="1048576"):
         list(messages.read(path))

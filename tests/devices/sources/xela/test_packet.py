@@ -116,16 +116,11 @@ def test_what_is_not_finite_is_missing():
     [
         ("", "truncated"),
         (NEW[:300], "truncated"),
-        ("[1, 2]", "Expected `object`, got `array`"),
-        ('{"message": 4294967296, "time": 1.0}', "its counter is no uint32"),
-        ('{"message": -1, "time": 1.0}', "its counter is no uint32"),
-        ('{"message": 1}', "its time is no number"),
-        ('{"message": 1, "time": NaN}', "its time is no number"),
-        ('{"message": 1, "time": true}', "its time is no number"),
-        ('{"message": 1, "time": "now"}', "its time is no number"),
-        ('{"message": 1, "time": 1e300}', "its time is thousands of years away"),
+        ("[1, 2]", "array"),
+        *((f'{{"message": {n}, "time": 1.0}}', "counter") for n in ("4294967296", "-1")),
+        ('{"message": 1}', "time"),
+        *((f'{{"message": 1, "time": {t}}}', "time") for t in ("NaN", "true", '"now"', "1e300")),
         ('{"message": 1, "time": 1e999}', "out of range"),
-        ('{"message": 1, "time": -1e11}', "its time is thousands of years away"),
         ('{"message": ' + "[" * 100_000 + "]" * 100_000 + "}", "recursion"),
         (b'{"message": "\xff"}', "utf-8"),
         ("\ud800", "surrogate"),
@@ -137,53 +132,40 @@ def test_invalid_packets(given, why):
     assert len(str(refusal.value)) <= 160
 
 
+NO_DATA = (
+    *("FA00,FB00,FC0", "FA00,FB00,FC00,", "FA00;FB00,FC00", "FA00,FB00,FCG0", "FA00,FB00,  00"),
+    *("FA00,F,00,FC00", "FA00,F\t00,FC00", "FA00,FB00,FC0é"),
+    *(f"{x}A00,FB00,FC00" for x in "+-/:@G`g\x7f ,"),
+)
+
+
 @pytest.mark.parametrize(
     ("part", "why"),
     [
-        ({"data": "FA00,FB00"}, "2 values given, three a taxel expected"),
-        ({"data": "FA00,FB00,FC0"}, "four hexadecimal digits"),
-        ({"data": "FA00,FB00,FC00,"}, "four hexadecimal digits"),
-        ({"data": "FA00;FB00,FC00"}, "four hexadecimal digits"),
-        ({"data": "FA00,FB00,FCG0"}, "no hexadecimal digit"),
-        ({"data": "FA00,FB00,  00"}, "no hexadecimal digit"),
-        ({"data": "FA00,F,00,FC00"}, "no hexadecimal digit"),
-        *(({"data": f"{x}A00,FB00,FC00"}, "no hexadecimal digit") for x in "+-/:@G`g\x7f ,"),
-        ({"data": "FA00,F\t00,FC00"}, "no hexadecimal digit"),
-        ({"data": "FA00,FB00,FC0é"}, "no hexadecimal digit"),
-        ({"data": 7}, "Expected `str | null`, got `int` - at `$.data`"),
-        ({"integer": [1, 2, 65536]}, "integer contains a number that is no uint16"),
-        ({"integer": [1, 2, -1]}, "integer contains a number that is no uint16"),
+        *(({"data": data}, "hexadecimal") for data in NO_DATA),
+        ({"data": "FA00,FB00"}, "2 values"),
+        ({"data": 7}, "data"),
+        ({"integer": [1, 2, 65536]}, "uint16"),
+        ({"integer": [1, 2, -1]}, "uint16"),
         ({"integer": [1, 2, 10**40]}, "integer"),
-        ({"integer": [1, 2, 0.5]}, "Expected `int`, got `float`"),
-        ({"integer": [1, 2]}, "2 values given, three a taxel expected"),
-        ({"data": "0001,0002,0003", "integer": [1, 2, 4]}, "data and integer differ"),
-        ({"data": "0001,0002,0003", "integer": [1, 2, 3, 4]}, "data and integer differ"),
-        ({"taxels": "1"}, "Expected `int | null`, got `str`"),
-        ({"model": 5}, "Expected `str`, got `int`"),
-        ({"model": "x" * 65}, "Expected `str` of length <= 64"),
-        ({"time": "now"}, "Expected `float | null`, got `str`"),
-        ({"time": 1e300}, "its time is thousands of years away"),
-        ([], "Expected `object`, got `array`"),
+        ({"integer": [1, 2, 0.5]}, "float"),
+        ({"integer": [1, 2]}, "2 values"),
+        ({"data": "0001,0002,0003", "integer": [1, 2, 4]}, "differ"),
+        ({"data": "0001,0002,0003", "integer": [1, 2, 3, 4]}, "differ"),
+        ({"taxels": "1"}, "taxels"),
+        ({"model": 5}, "model"),
+        ({"model": "x" * 65}, "64"),
+        ({"time": "now"}, "time"),
+        ({"time": 1e300}, "time"),
+        ([], "array"),
+        ({"calibrated": [1.0, 2.0]}, "2 values"),
+        ({"calibrated": "none"}, "calibrated"),
+        ({"calibrated": [1.0, "2", 3.0]}, "calibrated"),
     ],
 )
 def test_invalid_sensors(part, why):
-    with pytest.raises(InvalidPacket) as refusal:
-        readings(part)
-    assert why in str(refusal.value)
-
-
-@pytest.mark.parametrize(
-    ("part", "why"),
-    [
-        ({"calibrated": [1.0, 2.0]}, "2 values given, three a taxel expected"),
-        ({"calibrated": "none"}, "Expected `array | null`, got `str`"),
-        ({"calibrated": [1.0, "2", 3.0]}, "Expected `float | null`, got `str`"),
-    ],
-)
-def test_invalid_newtons(part, why):
-    with pytest.raises(InvalidPacket) as refusal:
-        readings(part, calibrated=True)
-    assert why in str(refusal.value)
+    with pytest.raises(InvalidPacket, match=why):
+        readings(part, calibrated="calibrated" in part)
 
 
 def test_newtons_do_not_need_valid_counts():

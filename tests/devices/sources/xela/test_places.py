@@ -1,3 +1,4 @@
+import re
 import socket
 
 import pytest
@@ -64,9 +65,8 @@ def test_without_a_default_route_there_is_no_own_address(monkeypatch):
     ],
 )
 def test_invalid_addresses(text):
-    with pytest.raises(ValueError, match="xela://HOST:PORT or xela://auto expected") as refusal:
+    with pytest.raises(ValueError, match=re.escape(text)):
         found(text)
-    assert str(refusal.value).startswith(f"{text}: ")
 
 
 def test_a_place_as_text():
