@@ -25,7 +25,7 @@ from typing import Any
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 DOCS = Path(__file__).parents[1] / "docs"
-PAGES = ("study.md", "study-changes.md", "study/paper.md", "study/real-data.md")
+PAGES = ("study.md", "study/paper.md", "study/real-data.md")
 FIGURES = ("experiment-1.png", "experiment-2.png")
 """Figures of the report that a page shows; they are copied to docs/img/."""
 MISSING = "–"

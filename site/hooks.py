@@ -26,7 +26,7 @@ from mkdocs.structure.pages import Page
 
 import holdfast
 import holdfast_grip
-from holdfast.cli.app import VERBS, main
+from holdfast.cli.app import SUB_VERBS, VERBS, main
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -115,7 +115,9 @@ def _printed(*words: str) -> str:
 
 @cache
 def _help_of(verb: str) -> str:
-    return _printed(verb, "--help-all")
+    """Return the help of a verb, and of its commands."""
+    commands = [name.split() for name in SUB_VERBS if name.startswith(f"{verb} ")]
+    return "\n".join(_printed(*words, "--help-all") for words in ([verb], *commands))
 
 
 def _verb_page(verb: str) -> str:

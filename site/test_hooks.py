@@ -31,6 +31,7 @@ def test_a_command_that_does_not_exist_is_a_warning(caplog, text, warning):
     "text",
     [
         "```sh\nholdfast detect m.json r --json > out  # states\n```",
+        "`holdfast label auto tracking a.mcap --motion stage.csv`",
         "`holdfast --version`",
         "holdfast squeezes nothing",
         "```python\nimport holdfast as hf\n```",

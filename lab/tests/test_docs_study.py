@@ -1,4 +1,4 @@
-"""The figures in docs/study.md and docs/study-changes.md are those of the published study."""
+"""The figures in docs/study.md and the pages beside it are those of the published study."""
 
 import importlib.util
 import json

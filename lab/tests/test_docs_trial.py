@@ -94,7 +94,6 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     assert "| `fixed` | 63.6<br><sub>" in page
     assert "On 11 fresh trials of the mild plant `holdfast` dropped 0.0 % of" in page
     assert "(grip/course.png)" in page and "(grip/force.png)" not in page
-    assert "| `builtin:any` | mild | 11 | 0.0 |" in page
     assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
 
 
