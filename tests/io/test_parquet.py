@@ -125,25 +125,21 @@ def test_a_cut_file_is_refused(make_recording, tmp_path):
     raw = path.read_bytes()
     for size in (4, 11, 12, len(raw) // 2, len(raw) - 9, len(raw) - 1):
         path.write_bytes(raw[:size])
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(RecordingError, match=f"{path} is cut"):
             load_recording(path)
-        assert str(caught.value) == (
-            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
-            "from which nothing can be recovered"
-        )
 
 
 def test_empty_and_foreign_files_are_refused(tmp_path):
-    path = tmp_path / "a.parquet"
-    path.write_bytes(b"")
-    with pytest.raises(RecordingError, match=r"a\.parquet is empty \(0 bytes\); a Parquet"):
-        load_recording(path)
-    path.write_text("time,t01_x\n")
-    with pytest.raises(RecordingError, match="is no Parquet file, or its first bytes are damaged"):
-        load_recording(path)
-    pq.write_table(pa.table({"a": [1]}), path)
-    with pytest.raises(RecordingError, match="is a Parquet file but no recording of holdfast"):
-        load_recording(path)
+    path, other = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    pq.write_table(pa.table({"a": [1]}), other)
+    for raw, text in (
+        (b"", "is empty"),
+        (b"time,t01_x\n", "is no Parquet file"),
+        (other.read_bytes(), "no recording of holdfast"),
+    ):
+        path.write_bytes(raw)
+        with pytest.raises(RecordingError, match=rf"a\.parquet .*{text}"):
+            load_recording(path)
 
 
 def test_an_error_leaves_no_file(make_recording, tmp_path):
@@ -151,11 +147,9 @@ def test_an_error_leaves_no_file(make_recording, tmp_path):
     thumb = recording.modules["thumb"]
     half = replace(thumb, readings=np.zeros_like(thumb.readings, np.float16))
     bad = {
-        "readings of thumb are float16": replace(recording, modules={"thumb": half}),
-        "plain JSON values": replace(recording, metadata={"a": object()}),
-        "truth needs finite, strictly increasing times": replace(
-            recording, truth=Truth(np.array([1.0, 0.0]))
-        ),
+        "float16": replace(recording, modules={"thumb": half}),
+        "JSON": replace(recording, metadata={"a": object()}),
+        "truth": replace(recording, truth=Truth(np.array([1.0, 0.0]))),
     }
     for text, wrong in bad.items():
         with pytest.raises(RecordingError, match=text):
@@ -165,7 +159,7 @@ def test_an_error_leaves_no_file(make_recording, tmp_path):
 
 def test_arrays_that_would_share_a_column_are_refused(make_recording, tmp_path):
     truth = Truth(np.array([0.0]), {"a.0": np.zeros(1), "a": np.zeros((1, 2))})
-    with pytest.raises(RecordingError, match=r"two arrays .* share the column 'truth\.hand\.a\.0'"):
+    with pytest.raises(RecordingError, match=r"truth\.hand\.a\.0"):
         save_recording(make_recording(truth=truth), tmp_path / "a.parquet")
 
 

@@ -99,42 +99,27 @@ def test_times_without_steps_are_seconds(values):
 
 @pytest.mark.parametrize("text", ["", "time", "time=", "when=t", "time=a,time=b", "x=y=z"])
 def test_a_text_of_another_form(text):
-    expected = (
-        "--columns: time=COLUMN, taxels=COLUMN, signs=COLUMN, label=COLUMN, cause=COLUMN, "
-        "module=COLUMN, episode=COLUMN expected"
-    )
-    with pytest.raises(ValueError, match=re.escape(expected)):
+    with pytest.raises(ValueError, match="--columns: time=COLUMN"):
         Columns.parse(text)
 
 
 @pytest.mark.parametrize(
-    ("columns", "names", "text"),
-    [
-        (
-            Columns(),
-            ("a", "x1", "y1", "z1"),
-            "no column of times among 'a', 'x1', 'y1', 'z1': give",
-        ),
-        (
-            Columns(),
-            ("t", "x1", "y1"),
-            "no taxel columns such as x1, y1, z1, x2 among 't', 'x1', 'y1'",
-        ),
-    ],
+    ("names", "text"),
+    [(("a", "x1", "y1", "z1"), "no column of times"), (("t", "x1", "y1"), "no taxel columns")],
 )
-def test_a_header_without_times_or_taxels(columns, names, text):
-    with pytest.raises(RecordingError, match=re.escape(text)):
-        columns.completed(names, ())
+def test_a_header_without_times_or_taxels(names, text):
+    with pytest.raises(RecordingError, match=text):
+        Columns().completed(names, ())
 
 
 @pytest.mark.parametrize(
     ("taxels", "text"),
     [
-        ("F{taxel}", "taxels=F{taxel}: {axis}, or FIRST..LAST, expected in it"),
-        ("G{axis}", "no column is named as 'G{axis}'; it has 't', 'a', 'b', 'c', 'd'"),
-        ("a..e", "taxels=a..e: no column 'e'; it has 't', 'a', 'b', 'c', 'd'"),
-        ("a..d", "taxels=a..d: 4 columns given; 3 for each taxel expected"),
-        ("c..a", "taxels=c..a: 0 columns given; 3 for each taxel expected"),
+        ("F{taxel}", "F{taxel}: {axis}"),
+        ("G{axis}", "'G{axis}'"),
+        ("a..e", "no column 'e'"),
+        ("a..d", "4 columns"),
+        ("c..a", "0 columns"),
     ],
 )
 def test_taxels_that_the_file_does_not_have(taxels, text):
