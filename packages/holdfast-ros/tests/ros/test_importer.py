@@ -275,9 +275,7 @@ def test_recordings_of_our_own_and_mcap_of_others_are_no_bags(tmp_path):
 def test_topics_without_samples(bag):
     with bag as given:
         given.write("/chatter", given.make("std_msgs/msg/String", data="hello"), EPOCH)
-    with pytest.raises(
-        RecordingError, match="/chatter .*--topic /TOPIC=SENSOR"
-    ):
+    with pytest.raises(RecordingError, match=r"/chatter .*--topic /TOPIC=SENSOR"):
         read(given.path)
 
 

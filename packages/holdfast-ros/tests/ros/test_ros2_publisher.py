@@ -63,5 +63,5 @@ def test_another_program_reads_what_is_published(domain):
 
 
 def test_domains():
-    with pytest.raises(ValueError, match="a ROS domain from 0 to 232 expected, '500' given"):
+    with pytest.raises(ValueError, match="'500'"):
         Link("500")

@@ -90,16 +90,3 @@ def test_the_grip_is_taken_over_and_given_back(example, gripper, grasp, monkeypa
 
 def scale(message):
     return width_meaning(list(message[1]["points"][0]["positions"]), 4.0, 2000.0)
-
-
-def test_a_hand_that_cannot_be_armed_is_an_error(example, gripper, grasp, capfd):
-    hold = example.Hold("builtin:twin", grasp, DRIVER.uri)  # 12 N at max_scale 3
-    answer = SimpleNamespace(success=None, message="")
-    example.answer(hold, SimpleNamespace(data=True), answer)
-    assert (answer.success, answer.message) == (
-        False,
-        "holdfast hold has ended: its last line says why",
-    )
-    assert "at most 10 N expected, 12 N given at max_scale 3" in capfd.readouterr().err
-    assert not gripper.messages
-    assert example.answer(hold, SimpleNamespace(data=False), answer).success
