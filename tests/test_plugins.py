@@ -124,15 +124,10 @@ def test_nothing_is_imported_before_it_is_used(parts):
 
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [
-        ("gone", "'no_such_module'"),
-        ("number", "'parts'"),
-        ("mute", "Mute"),
-        ("odd", "GeneratorExit"),
-    ],
+    [("gone", "no_such_module"), ("number", "parts"), ("mute", "Mute"), ("odd", "GeneratorExit")],
 )
 def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, name, reason):
-    with pytest.raises(ValueError, match="unknown|holdfast doctor"):
+    with pytest.raises(ValueError, match=r"unknown|holdfast doctor"):
         open_source(f"{name}:")
     begin = f"plug-in {name} (sources of acme 1.2) is skipped"
     assert any(text.startswith(begin) and reason in text for text in reports(caplog))
@@ -152,7 +147,7 @@ def test_a_broken_importer_does_not_hinder_the_others(parts, caplog):
     assert broken.startswith("plug-in broken (importers of acme 1.2) is skipped")
     assert broken.endswith("no device")
     assert half.startswith("plug-in half (importers of acme 1.2) is skipped")
-    with pytest.raises(ValueError, match="half .*holdfast doctor"):
+    with pytest.raises(ValueError, match=r"half .*holdfast doctor"):
         import_recordings(parts / "a.txt", "half")
 
 

@@ -121,7 +121,7 @@ def test_recordings_that_were_deleted(tmp_path):
     assert kept.open(0).recording.name == "one"
     kept.paths[0].unlink()
     for ask in (kept.summary, kept.open, kept.stored, kept.signals):
-        with pytest.raises(RecordingError, match=r"^cannot read .*one\.parquet: No such file"):
+        with pytest.raises(RecordingError, match=r"one\.parquet: No such file"):
             ask(0)
 
 
