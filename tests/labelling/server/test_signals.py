@@ -162,7 +162,7 @@ def test_invalid_parts_are_rejected(start, end, points, text):
 
 def test_a_tare_without_samples_is_rejected():
     for tare in ((50.0, 60.0), "soon"):
-        with pytest.raises(ValueError, match="^tare"):
+        with pytest.raises(ValueError, match=r"^tare"):
             signals_of(RECORDING, tare)
 
 
