@@ -22,6 +22,14 @@ from holdfast.recordings import Truth
 SAMPLE_TOPICS = ("/tactile/thumb", "/tactile/index/1")
 
 
+@pytest.fixture
+def saved(make_recording, tmp_path):
+    """A recording, the path of its file, and the bytes in it."""
+    recording, path = make_recording(), tmp_path / "a.mcap"
+    save_recording(recording, path)
+    return recording, path, path.read_bytes()
+
+
 @settings(max_examples=60)
 @given(data=st.data())
 def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory):
@@ -31,19 +39,16 @@ def test_what_is_written_is_read(data, recordings, assert_same, tmp_path_factory
     assert_same(load_recording(path), recording)
 
 
-def test_a_whole_recording(make_recording, assert_same, tmp_path):
-    recording = make_recording()
-    save_recording(recording, tmp_path / "a.mcap")
-    loaded = load_recording(tmp_path / "a.mcap")
-    assert_same(loaded, recording)
-    assert loaded.complete
+def test_a_whole_recording(saved, assert_same):
+    recording, path, _ = saved
+    assert_same(load_recording(path), recording)
+    assert load_recording(path).complete
 
 
-def test_others_decode_it(make_recording, tmp_path):
-    recording = make_recording()
-    save_recording(recording, tmp_path / "a.mcap")
+def test_others_decode_it(saved):
+    recording, path, _ = saved
     found = {}
-    with (tmp_path / "a.mcap").open("rb") as file:
+    with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for _, channel, _, message in reader.iter_decoded_messages():
             found.setdefault(channel.topic, []).append(message)
@@ -60,13 +65,13 @@ def test_others_decode_it(make_recording, tmp_path):
     assert [(m.time, m.text) for m in found["/holdfast/markers"]] == list(recording.markers)
 
 
-def test_messages_and_chunks_are_short(make_recording, tmp_path):
-    save_recording(make_recording(), tmp_path / "a.mcap")
-    with (tmp_path / "a.mcap").open("rb") as file:
+def test_messages_and_chunks_are_short(saved):
+    _, path, _ = saved
+    with path.open("rb") as file:
         records = list(StreamReader(file, emit_chunks=True, validate_crcs=True).records)
     chunks = [record for record in records if isinstance(record, Chunk)]
     assert all(chunk.message_end_time - chunk.message_start_time <= 0.3e9 for chunk in chunks[1:])
-    with (tmp_path / "a.mcap").open("rb") as file:
+    with path.open("rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         for _, channel, _, message in reader.iter_decoded_messages(topics=SAMPLE_TOPICS):
             assert message.times[-1] - message.times[0] <= 0.1, channel.topic
@@ -133,21 +138,16 @@ def test_a_cut_and_damaged_file_gives_a_sound_prefix_or_nothing(make_recording, 
     assert 0 < n_sound < 300
 
 
-def test_a_cut_before_the_first_samples_is_refused(make_recording, tmp_path):
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(), path)
-    raw = path.read_bytes()
+def test_a_cut_before_the_first_samples_is_refused(saved):
+    _, path, raw = saved
     for size, text in ((0, "empty"), (4, "no MCAP"), (60, "no header"), (2000, "no samples")):
         path.write_bytes(raw[:size])
         with pytest.raises(RecordingError, match=f"{path} .*{text}"):
             load_recording(path)
 
 
-def test_zeros_after_the_cut_are_no_data(make_recording, tmp_path):
-    recording = make_recording()
-    path = tmp_path / "a.mcap"
-    save_recording(recording, path)
-    raw = path.read_bytes()
+def test_zeros_after_the_cut_are_no_data(saved):
+    recording, path, raw = saved
     path.write_bytes(raw[: len(raw) // 2] + bytes(5000))
     try:
         assert_prefix(load_recording(path), recording)
@@ -155,12 +155,10 @@ def test_zeros_after_the_cut_are_no_data(make_recording, tmp_path):
         assert "fails its checksum" in str(refusal)
 
 
-def test_a_chunk_lost_from_the_middle_is_damage(make_recording, tmp_path):
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(), path)
+def test_a_chunk_lost_from_the_middle_is_damage(saved):
+    _, path, raw = saved
     with path.open("rb") as file:
         chunks = [r for r in StreamReader(file, emit_chunks=True).records if isinstance(r, Chunk)]
-    raw = path.read_bytes()
     lost = raw.index(chunks[5].data)
     opcode = raw.rindex(b"\x06" + (len(chunks[5].data) + 44).to_bytes(8, "little"), 0, lost)
     end = opcode + 9 + len(chunks[5].data) + 44
@@ -179,10 +177,8 @@ def chunk_places(raw):
 
 
 @pytest.mark.parametrize("inside", [1, 41], ids=["length of the record", "length of its data"])
-def test_a_damaged_length_in_a_cut_file_is_no_cut(make_recording, tmp_path, inside):
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(), path)
-    raw = path.read_bytes()
+def test_a_damaged_length_in_a_cut_file_is_no_cut(saved, inside):
+    _, path, raw = saved
     place = chunk_places(raw)[3]
     for bit in range(64):
         damaged = bytearray(raw[: len(raw) * 2 // 3])
@@ -192,10 +188,8 @@ def test_a_damaged_length_in_a_cut_file_is_no_cut(make_recording, tmp_path, insi
             load_recording(path)
 
 
-def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(make_recording, tmp_path):
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(), path)
-    raw = path.read_bytes()
+def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(saved):
+    _, path, raw = saved
     *_, place = [p for p in chunk_places(raw) if p < len(raw) * 2 // 3]
     for bit in range(8):
         damaged = bytearray(raw[: len(raw) * 2 // 3])
@@ -206,10 +200,8 @@ def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(make_recording, tmp_pa
 
 
 @pytest.mark.parametrize("name", [b"lz4", b"zzz\xff", b""])
-def test_another_compression_in_a_cut_file_is_refused(make_recording, tmp_path, name):
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(), path)
-    raw = path.read_bytes()
+def test_another_compression_in_a_cut_file_is_refused(saved, name):
+    _, path, raw = saved
     place = chunk_places(raw)[3] + 9 + 32
     damaged = bytearray(raw[: len(raw) * 2 // 3])
     damaged[place : place + 4] = name.ljust(4, b"x")
@@ -218,12 +210,9 @@ def test_another_compression_in_a_cut_file_is_refused(make_recording, tmp_path, 
         load_recording(path)
 
 
-def test_zeros_in_place_of_the_last_chunks_are_a_cut(make_recording, tmp_path):
+def test_zeros_in_place_of_the_last_chunks_are_a_cut(saved):
     """After a failure of the power a file has its new size, but zeros in place of the data."""
-    recording = make_recording()
-    path = tmp_path / "a.mcap"
-    save_recording(recording, path)
-    raw = path.read_bytes()
+    recording, path, raw = saved
     place = chunk_places(raw)[3]
     for end in (place, place + 5, place + 60, place + 1000):
         path.write_bytes(raw[:end] + bytes(20_000))
@@ -278,11 +267,9 @@ for k in range(10**9):
         np.testing.assert_array_equal(module.readings[:, 0, 0], np.arange(module.n_samples))
 
 
-def test_all_bytes_are_under_a_checksum(make_recording, tmp_path):
+def test_all_bytes_are_under_a_checksum(saved):
     """The checks rest on CRCs that the MCAP format itself has: others find damage too."""
-    path = tmp_path / "a.mcap"
-    save_recording(make_recording(90), path)
-    raw = path.read_bytes()
+    _, _, raw = saved
     assert raw.endswith(MCAP0_MAGIC)
     start = int.from_bytes(raw[-28:-20], "little")
     assert zlib.crc32(raw[: start - 13]) == int.from_bytes(raw[start - 4 : start], "little")

@@ -28,7 +28,9 @@ def test_samples_come_back_however_they_were_given(cuts, tmp_path_factory):
     edges = [0, *sorted(cuts), 100]
     with RecordingWriter(path, {"thumb": ANYSKIN, "none": ANYSKIN}) as writer:
         for first, last in pairwise(edges):
-            writer.append("thumb", times[first:last], values[first:last])
+            given = values[first:last].copy()
+            writer.append("thumb", times[first:last], given)
+            given[:] = 0  # the arrays may be changed afterwards
     recording = load_recording(path)
     np.testing.assert_array_equal(recording.modules["thumb"].times, times)
     np.testing.assert_array_equal(recording.modules["thumb"].readings, values)
@@ -52,16 +54,6 @@ def test_all_that_was_said_comes_back(tmp_path):
     assert (recording.name, recording.modules["thumb"].unit) == ("grasp", "N")
     assert recording.metadata == {"object": "can"}
     assert (recording.markers, recording.media) == (((1.0, "now"),), (("a.mp4", 0.5),))
-
-
-def test_given_arrays_may_be_changed_afterwards(tmp_path):
-    values = readings(1)
-    with RecordingWriter(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as writer:
-        writer.append("thumb", [0.0], values)
-        values[:] = 0
-    np.testing.assert_array_equal(
-        load_recording(tmp_path / "a.mcap").modules["thumb"].readings, readings(1)
-    )
 
 
 def test_while_it_runs_at_most_half_a_second_is_missing(tmp_path):

@@ -14,6 +14,14 @@ from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
 
+@pytest.fixture
+def saved(make_recording, tmp_path):
+    """The path of a short recording, and the bytes in its file."""
+    path = tmp_path / "a.parquet"
+    save_recording(make_recording(90), path)
+    return path, path.read_bytes()
+
+
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(data=st.data())
@@ -97,19 +105,16 @@ def test_row_groups_have_a_limited_size(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
-    path, damaged = tmp_path / "a.parquet", tmp_path / "b.parquet"
-    save_recording(make_recording(90), path)
-    for _, raw in flipped(path.read_bytes(), 400):
-        damaged.write_bytes(raw)
+def test_any_flipped_bit_is_found(saved, flipped):
+    path, raw = saved
+    for _, damaged in flipped(raw, 400):
+        path.write_bytes(damaged)
         with pytest.raises(RecordingError, match="damaged"):
-            load_recording(damaged)
+            load_recording(path)
 
 
-def test_every_character_of_the_checksum_counts(make_recording, tmp_path):
-    path = tmp_path / "a.parquet"
-    save_recording(make_recording(90), path)
-    raw = path.read_bytes()
+def test_every_character_of_the_checksum_counts(saved):
+    path, raw = saved
     start = raw.index(CHECKSUM_KEY.encode())
     for place in range(start, start + len(CHECKSUM_KEY) + 66):
         damaged = bytearray(raw)
@@ -119,10 +124,8 @@ def test_every_character_of_the_checksum_counts(make_recording, tmp_path):
             load_recording(path)
 
 
-def test_a_cut_file_is_refused(make_recording, tmp_path):
-    path = tmp_path / "a.parquet"
-    save_recording(make_recording(90), path)
-    raw = path.read_bytes()
+def test_a_cut_file_is_refused(saved):
+    path, raw = saved
     for size in (4, 11, 12, len(raw) // 2, len(raw) - 9, len(raw) - 1):
         path.write_bytes(raw[:size])
         with pytest.raises(RecordingError, match=f"{path} is cut"):

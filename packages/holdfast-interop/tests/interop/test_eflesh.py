@@ -86,16 +86,10 @@ def test_nothing_is_unpickled(tmp_path):
     pickle.loads(pickle.dumps(Bomb(target)))
     assert target.exists(), "the bomb of this test does not work"
     target.unlink()
-    path = write(tmp_path / "seq_1.pt", pickle=pickle.dumps(Bomb(target), 2))
-    (recording,) = import_recordings(path)
-    assert recording.modules["finger1"].n_samples == N
-    assert not target.exists()
-
-
-def test_a_pickle_that_is_missing_or_none_is_not_needed(tmp_path):
-    for content in (None, b"", b"\x00\xff" * 10):
-        path = write(tmp_path / "seq_1.pt", pickle=content)
-        assert next(import_recordings(path)).modules["finger2"].n_samples == N
+    for content in (pickle.dumps(Bomb(target), 2), None, b"", b"\x00\xff" * 10):
+        (recording,) = import_recordings(write(tmp_path / "seq_1.pt", pickle=content))
+        assert recording.modules["finger1"].n_samples == N
+        assert not target.exists()
 
 
 @pytest.mark.parametrize(
@@ -114,10 +108,9 @@ def test_tensors_of_another_form(tmp_path, values, members, text):
     assert re.search(rf"seq_1\.pt: .*{text}", refusal(path))
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_a_value_that_is_no_number(tmp_path, value):
+def test_a_value_that_is_no_number(tmp_path):
     values = VALUES.copy()
-    values[3, 7] = value
+    values[3, 7] = np.inf
     assert "seq_1.pt, row 3, value 7" in refusal(write(tmp_path / "seq_1.pt", values))
 
 

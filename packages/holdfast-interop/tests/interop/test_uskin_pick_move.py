@@ -78,11 +78,6 @@ def test_slip_is_unstable_and_fail_is_lost(folder):
         assert (module.label_states == [3] * 2 + [2] * 4 + [1] * 6).all()
 
 
-def test_labels_can_stay_behind(folder):
-    (recording,) = import_recordings(folder, labels=False)
-    assert not any(module.labels for module in recording.modules.values())
-
-
 def narrow(text):
     return "\n".join(line.rpartition(",")[0] for line in text.splitlines())
 

@@ -13,7 +13,6 @@ from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 from holdfast_ros.hands import ros_hand
-from holdfast_ros.hands.joint_hand import LIMIT_TOLERANCE
 
 from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, ROS2, THUMB_FIRST, V4, home
 
@@ -33,14 +32,6 @@ class TestOpening:
         driver(replace(ROS2["v4"], states=None))
         with pytest.raises(HandError, match="no joint states on /joint_states"):
             open_hand("ros2:v4").open()
-
-    def test_a_second_publisher_that_is_shared(self, driver):
-        peer = driver(ROS2["gripper"])
-        uri = f"{ROS2['gripper'].uri}&shared=true"
-        with open_hand(uri) as first, open_hand(uri) as second:
-            first.send(COMMAND)
-            second.send(RELEASE)
-            assert {message["data"] for _, message in peer.wait(2)} == {4 * 1.2, 0.0}
 
 
 class TestBeginOfTheGrip:
@@ -63,25 +54,6 @@ class TestBeginOfTheGrip:
         order = [":".join([f, *part]) for f, part in zip(THUMB_FIRST, parts, strict=True)]
         with open_hand(f"ros2:v4?joints={','.join(order)}") as hand:
             hand.send(COMMAND)
-
-    def test_joint_states_without_names_have_the_order_of_the_commands(self, driver):
-        peer = driver(ROS2["v4"], names=[])
-        with open_hand("ros2:v4") as hand:
-            hand.send(COMMAND)
-            assert ROS2["v4"].meaning(peer.wait(1))["thumb"] == pytest.approx(1.2)
-
-    def test_the_base_is_a_median_over_the_time_in_which_the_hand_was_stable(self, driver):
-        peer = driver(ROS2["v4"])
-        with open_hand("ros2:v4") as hand:
-            peer.stop_states()
-            hand._poll()
-            _, states = hand._states[-1]
-            hand._states.clear()
-            for factor in (0.5, 0.9, 0.6, 9.0, 0.7):
-                changed = states._replace(efforts=factor * states.efforts)
-                hand._states.append((time.monotonic(), changed))
-            hand.send(COMMAND)
-            assert ROS2["v4"].meaning(peer.wait(1))["thumb"] == pytest.approx(1.2 * 0.7)
 
     def test_set_points_stay_within_the_joints_limits(self, driver):
         peer = driver(ROS2["v4"])
@@ -106,14 +78,6 @@ class TestWrongJointStates:
         driver(ROS2["v4"]).spoil(1e6, every=1)
         with pytest.raises(HandError, match=r"0 valid .*thumb joint 0 at 1e\+06 rad"):
             open_hand("ros2:v4").open()
-
-    @pytest.mark.parametrize(
-        ("beyond", "is_refused"), [(LIMIT_TOLERANCE - 0.01, False), (LIMIT_TOLERANCE + 0.01, True)]
-    )
-    def test_a_reading_may_be_a_little_beyond_its_limit(self, driver, beyond, is_refused):
-        driver(ROS2["v4"]).spoil(1.396 + beyond)
-        with open_hand("ros2:v4") as hand:
-            assert (hand.n_refused > 0) is is_refused
 
 
 class TestSilence:
