@@ -40,13 +40,6 @@ def test_a_whole_recording(make_recording, assert_same, tmp_path):
     assert loaded.complete
 
 
-def test_the_built_in_sensors_come_back_equal(tmp_path):
-    curved = sensor("uskin-curved")
-    module = Tactile(curved, [0.0], np.zeros((1, 30, 3)))
-    save_recording(Recording("a", {"thumb": module}), tmp_path / "a.parquet")
-    assert load_recording(tmp_path / "a.parquet").modules["thumb"].sensor == curved
-
-
 def test_a_file_renamed_renames_its_recording(make_recording, tmp_path):
     save_recording(make_recording(name="before"), tmp_path / "a.parquet")
     assert load_recording(tmp_path / "a.parquet").name == "before"

@@ -10,12 +10,12 @@ from holdfast.io import labels_to_csv, save_labels, save_recording
 from holdfast.labelling.labelled_files import read_labels
 from holdfast.recordings import Label
 from holdfast.removed import REMOVED
-from labelling.tiny import tiny_recording
+from holdfast.synthetic import synthetic_recording
 
 
 @pytest.fixture(scope="module")
 def grasp():
-    return tiny_recording(3)
+    return synthetic_recording("grasp-3", 3, ("thumb", "index"))
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def refused(path, recording, text):
 
 @pytest.mark.parametrize("write", [as_label_file, as_recording])
 def test_labels_of_another_recording(tmp_path, grasp, write):
-    other = replace(tiny_recording(5), name="other")
+    other = replace(grasp, name="other", modules={"thumb": grasp.modules["thumb"]})
     refused(write(grasp, tmp_path), other, grasp.digest[:12])
 
 

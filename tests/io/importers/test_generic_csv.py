@@ -127,13 +127,6 @@ def test_a_sensor_whose_z_falls_when_it_is_pressed(tmp_path):
         import_recordings(path, columns="signs=-")
 
 
-def test_a_file_without_times(tmp_path):
-    write(tmp_path / "a.csv", [], OTHER, [list(range(k, k + 15)) for k in range(3)])
-    columns = "time=50Hz,taxels=Fx0..Fz4"
-    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY, columns=columns)
-    assert recording.modules["finger1"].times.tolist() == [0.0, 0.02, 0.04]
-
-
 def test_sensors_and_columns_are_for_csv(tmp_path):
     with pytest.raises(ValueError, match="'gtac'"):
         import_recordings(tmp_path, "gtac", sensors=ANY)
@@ -280,12 +273,6 @@ def test_a_folder_of_plain_files_and_a_sensor(tmp_path, header, name):
     option = texts[1].split("'")[1]  # what was guessed can be given
     (again,) = import_recordings(tmp_path, sensors=ANY, columns=option)
     assert again.digest == recording.digest
-
-
-def test_plain_columns_beside_labels(tmp_path):
-    write_numbers(tmp_path / "a.csv", PLAIN["numbered"] + ",label", "stable")
-    (recording,) = import_recordings(tmp_path, sensors=ANY)
-    assert recording.modules["finger1"].label_states.tolist() == [STABLE] * 3
 
 
 def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path):

@@ -10,15 +10,6 @@ def label(start, end, confidence):
     return Label(start, end, "STABLE", confidence=confidence)
 
 
-def test_the_most_doubtful_comes_first():
-    labels = {
-        "thumb": (label(0, 1, 0.9), label(1, 2, 0.5), label(2, 3, 0.79)),
-        "index": (label(0, 1, 0.1), label(1, 2, 0.8)),
-    }
-    found = [(finger, each.confidence) for finger, each in doubtful(labels)]
-    assert found == [("index", 0.1), ("thumb", 0.5), ("thumb", 0.79)]
-
-
 def test_of_equal_confidence_the_longest_comes_first_and_then_the_earliest():
     labels = {"b": [label(5, 6, 0.3), label(0, 2, 0.3)], "a": [label(0, 1, 0.3)]}
     found = [(finger, each.start) for finger, each in doubtful(labels)]

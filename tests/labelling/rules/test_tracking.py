@@ -18,7 +18,6 @@ from holdfast.recordings import Recording, Truth, label_states
 from .build import (
     CLOSING,
     DURATION,
-    GRIP,
     LOCKED,
     PUSH,
     PUSHED,
@@ -176,19 +175,6 @@ def test_a_frozen_marker_is_neither_motion_nor_rest():
     codes = label_states(tracking.propose(recording)["thumb"], times)
     assert (codes[405:595] == 0).all()
     assert (codes[320:395] == 3).all()
-
-
-def test_a_marker_at_the_sentinel_is_lost():
-    times = clock()
-    held = GRIP * np.where(times < 8, 1.0, 0.0)[:, None] * [0, 0, 1]
-    held[:, 2] += np.random.default_rng(0).normal(0, GRIP / 100, len(times))
-    pose = poses(times, slide(times, ((5, 6),)), jitter=1e-5)
-    pose[times > 8, :3] = 10.0
-    truth = Truth(times, {"marker_pose": pose})
-    recording = Recording("lost", {"finger1": module(times, held)}, truth=truth)
-    states = drawn(tracking.propose(recording, tare="first")["finger1"])
-    assert [state for state, *_ in states] == ["STABLE", "UNSTABLE", "STABLE", "NO_CONTACT"]
-    assert states[-1][1] == pytest.approx(8, abs=EDGE)
 
 
 @pytest.mark.parametrize("offset", [-0.3, 0.0, 0.22])

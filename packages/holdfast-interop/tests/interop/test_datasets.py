@@ -1,5 +1,6 @@
 import json
 import shutil
+from hashlib import sha256
 
 import msgspec
 import pytest
@@ -18,13 +19,6 @@ FOLDERS = {
     "gtac-manipulation": "gtac",
 }  # fmt: skip
 """Folder of the real recordings that has files of a set."""
-DETECTED = {
-    "uskin-pick-move": ("data_sample_2022-02-22-08-10-01", 5),
-    "eflesh-tugs": ("seq_0", 69),
-    "gtac-grasps": ("Apple_700_GTAC_20220826_212333", 21),
-    "gtac-manipulation": ("translating_strawberry", 3),
-}
-"""A recording of each set, and how many have checksums."""
 
 
 @pytest.fixture(autouse=True)
@@ -127,25 +121,27 @@ def test_nothing_is_overwritten(capsys, made_up):
 
 
 @pytest.mark.parametrize("name", FOLDERS)
-def test_real_recordings_from_a_server_to_a_decision(name, capsys, data_folder, tmp_path):
+def test_checksums_are_those_of_the_real_files(name, data_folder):
+    known = {file.path: file.sha256 for file in find_set(name).files if file.sha256}
+    assert known
+    for path, expected in known.items():
+        content = (data_folder / FOLDERS[name] / path).read_bytes()
+        assert sha256(content).hexdigest() == expected
+
+
+def test_real_recordings_from_a_server_to_a_decision(capsys, data_folder, tmp_path):
     """The files that have a checksum: `get`, `info` and `detect`."""
+    name, public = "gtac-manipulation", find_set("gtac-manipulation")
     shutil.copytree(data_folder / FOLDERS[name], tmp_path / "remote" / name)
-    recording, n_recordings = DETECTED[name]
     with serving(tmp_path / "remote") as server:
         words = ("get", name, "--with-checksum", "--mirror", server.url)
         document = document_of(capsys, *words)
-        n_files = len(set(server.requests))
-    assert (document["n_recordings"], document["n_unchecked"]) == (n_recordings, 0)
-    assert n_files == document["n_files"]
-    path = tmp_path / name / f"{recording}.parquet"
-    assert main(["info", str(path), "--json"]) == 0
-    modules = json.loads(capsys.readouterr().out)["modules"]
-    public = find_set(name)
-    assert {module["sensor"] for module in modules.values()} == set(public.sensors)
-    assert len(modules) == public.n_modules
-    for module in modules.values():
-        assert module["rate"] == pytest.approx(public.rate, rel=0.02)
-    words = ["detect", "builtin:any", str(path), "--json", *["--in-contact"] * public.starts_loaded]
-    assert main(words) == 0
+        assert len(set(server.requests)) == document["n_files"]
+    assert (document["n_recordings"], document["n_unchecked"]) == (3, 0)
+    path = tmp_path / name / "translating_strawberry.parquet"
+    (module,) = Verb("info").document(capsys, path)["modules"].values()
+    assert [module["sensor"]] == list(public.sensors)
+    assert module["rate"] == pytest.approx(public.rate, rel=0.02)
+    assert main(["detect", "builtin:any", str(path), "--json"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert "STABLE" in {json.loads(line)["state"] for line in lines}

@@ -213,13 +213,6 @@ def test_forces_that_are_missing_stay_missing(tmp_path):
     assert np.isnan(readings).any(axis=(1, 2)).tolist() == [False, False, True, False]
 
 
-def test_another_number_of_pillars(tmp_path):
-    with BagWriter(tmp_path / "pillars", "mcap", "sensor_interfaces", PILLARS) as given:
-        write_pillars(given, "/hub_0/sensor_0", EPOCH, 1000, np.ones((8, 3)))
-    with pytest.raises(RecordingError, match="8 taxels given, 9 expected"):
-        read(given.path)
-
-
 def test_clocks_of_two_devices_are_not_mixed(tmp_path):
     with BagWriter(tmp_path / "both", "mcap", "p", PILLARS | XELA) as given:
         for k in range(N):
@@ -312,12 +305,3 @@ def test_cut_and_damaged_bags(any_bag):
             text = f"^{part} is cut or damaged: .*; to recover it: {commands[whole.suffix]}$"
             with pytest.raises(RecordingError, match=text):
                 read(part)
-
-
-@pytest.mark.parametrize(
-    "text", ["", "[1, 2", "a: 1", "rosbag2_bagfile_information: {version: 99}"]
-)
-def test_metadata_that_are_none(tmp_path, text):
-    (tmp_path / "metadata.yaml").write_text(text)
-    with pytest.raises(RecordingError, match=f"{tmp_path} is cut or damaged"):
-        read(tmp_path)

@@ -14,7 +14,7 @@ from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 from holdfast_ros.hands import ros_hand
 
-from .drivers import AH_NAMES, EFFORTS, FLOATS, PLEXUS, ROS2, THUMB_FIRST, V4, home
+from .drivers import AH_NAMES, EFFORTS, ROS2, THUMB_FIRST, V4
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
@@ -71,15 +71,6 @@ class TestBeginOfTheGrip:
         assert not peer.messages
 
 
-class TestWrongJointStates:
-    """What a hand reads must be within the limits of its joints."""
-
-    def test_a_hand_without_a_valid_state_is_not_opened(self, driver, impatient):
-        driver(ROS2["v4"]).spoil(1e6, every=1)
-        with pytest.raises(HandError, match=r"0 valid .*thumb joint 0 at 1e\+06 rad"):
-            open_hand("ros2:v4").open()
-
-
 class TestSilence:
     def test_a_driver_that_ends(self, driver):
         peer = driver(ROS2["gripper"])
@@ -116,17 +107,6 @@ class TestSilence:
             end(peer)
             with pytest.raises(HandError, match=text):
                 send_for_a_minute(hand)
-
-
-def test_plexus_opens_to_a_pose(driver):
-    topics = {**ROS2["plexus"].topics, f"{PLEXUS}/commands": FLOATS}
-    peer = driver(replace(ROS2["plexus"], topics=topics))
-    pose = home(THUMB_FIRST)
-    uri = f"{ROS2['plexus'].uri}&release=home&home={','.join(map(str, pose))}"
-    with open_hand(uri) as hand:
-        hand.send(RELEASE)
-        ((topic, message),) = peer.wait(1)
-    assert (topic, list(message["data"])) == (f"{PLEXUS}/commands", pose)
 
 
 def send_for_a_minute(hand):

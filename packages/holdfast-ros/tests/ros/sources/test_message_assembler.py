@@ -156,11 +156,6 @@ class TestPackets:
         (arrival,) = assembler.assemble([uskin(2, sequence=90)], 50.02)
         assert arrival.n_lost == 0
 
-    def test_invalid_messages_are_reported(self):
-        (arrival,) = identified(uskin(0)).refuse("cut", 50.0)
-        assert (arrival.n_refused, arrival.samples) == (1, {})
-        assert "cut" in arrival.notices[0]
-
 
 @pytest.mark.parametrize(
     ("unit", "later"),

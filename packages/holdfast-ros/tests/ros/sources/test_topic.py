@@ -154,7 +154,3 @@ def test_bad_addresses(text, message):
     address = parse(text)[1]
     with pytest.raises(ValueError, match=message):
         TopicSource(address, Script()) if "?" in text else topic_of(address)
-
-
-def test_a_topic_may_have_parts():
-    assert topic_of(parse("ros2:///hub_0/sensor_0")[1]) == "/hub_0/sensor_0"
