@@ -85,11 +85,10 @@ def test_a_publisher_is_replaced_by_another(domain):
 
 def test_pillars(domain):
     types = store("sensor_interfaces", PILLARS, ros2=True)
-    write = dds.Node(domain).writer(
-        "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState")
-    )
-    source = open_source("ros2:///hub_0/sensor_0?fingers=1:tip")
-    arrivals = fed(source, lambda k: write(pillars(types, k)))
+    topic, kind = "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState")
+    source = open_source(f"ros2://{topic}?fingers=1:tip")
+    with writing(domain, topic, kind, lambda k: pillars(types, k)), source:
+        arrivals = list(itertools.islice((a for a in source if a.samples), 10))
     assert source.sensors == {"tip": sensor("papillarray")}
     assert arrivals[-1].samples["tip"].shape == (9, 3)
     np.testing.assert_allclose(np.diff([a.time for a in arrivals]), 0.001)
@@ -102,21 +101,21 @@ def pillars(types, k):
     return bytes(types.serialize_cdr(message, message.__msgtype__))
 
 
-def fed(source, write):
-    """Ten arrivals of a source, while a thread writes."""
-    over = Event()
+@contextmanager
+def writing(domain, topic, kind, data):
+    """Write the data of message 0, 1, ... to a topic, in a thread."""
+    write, over = dds.Node(domain).writer(topic, kind), Event()
 
     def run():
         for k in itertools.count():
             if over.wait(0.01):
                 return
-            write(k)
+            write(data(k))
 
     thread = Thread(target=run)
     thread.start()
     try:
-        with source:
-            return list(itertools.islice((a for a in source if a.samples), 10))
+        yield
     finally:
         over.set()
         thread.join()
@@ -153,6 +152,17 @@ def test_bad_domains(given, monkeypatch):
         open_source("ros2:///a")
 
 
-def test_unknown_parameters():
-    with pytest.raises(ValueError, match="unknown parameter master"):
-        open_source("ros2:///a?master=x")
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ros2://host/xServTopic", "ros2:///TOPIC"),
+        ("ros2:///", "ros2:///TOPIC"),
+        ("ros2:///a?values=forces", "'forces'"),
+        ("ros2:///a?sensor=mine", "sensor=FILE.json"),
+        ("ros2:///a?fingers=thumb", "'thumb'"),
+        ("ros2:///a?master=x", "unknown parameter master"),
+    ],
+)
+def test_bad_addresses(text, message):
+    with pytest.raises(ValueError, match=message):
+        open_source(text)
