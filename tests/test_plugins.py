@@ -100,12 +100,9 @@ def reports(caplog):
     return [record.getMessage() for record in caplog.records if record.name == "holdfast.plugins"]
 
 
-def test_each_kind_is_found_by_its_name(parts):
+def test_each_is_found_by_its_name_and_listed_after_our_own(parts, caplog):
     assert open_hand("grab:left").name == "grab:left"
     assert parse("gone://host")[0] == "gone"
-
-
-def test_names_are_listed_after_our_own(parts, caplog):
     with pytest.raises(ValueError, match="of plug-ins: grab, hollow, ros2"):
         open_hand("grip:left")
     with pytest.raises(ValueError, match="xela:, twin:, serial:, gone:, mute:"):

@@ -259,13 +259,6 @@ def external_link(content, other):
     content["F"] = h5py.ExternalLink(str(other), "F")
 
 
-def external_storage(content, other):
-    import h5py
-
-    place = (str(other), 0, h5py.h5f.UNLIMITED)
-    content.create_dataset("F", READINGS.shape, "f8", external=[place])
-
-
 def virtual(content, other):
     import h5py
 
@@ -281,7 +274,7 @@ def soft_link(content, other):
     content["F"] = h5py.SoftLink("/G")
 
 
-@pytest.mark.parametrize("store", [external_link, external_storage, virtual, soft_link])
+@pytest.mark.parametrize("store", [external_link, virtual, soft_link])
 def test_nothing_outside_of_the_file_is_read(tmp_path, store):
     h5py = pytest.importorskip("h5py", reason="h5py is not installed")
     other = hdf5(tmp_path / "other", {"F": READINGS})

@@ -24,13 +24,6 @@ def test_noise_is_that_of_the_tare_stretch():
     assert noise == pytest.approx(alone, rel=0.5)
 
 
-def test_contact_begins_and_ends_where_the_force_does():
-    hand = hand_force(grasp())
-    touching = hand.times[hand.n_touching == 2]
-    assert touching[0] == pytest.approx(CLOSING, abs=0.05)
-    assert touching[-1] == pytest.approx(FREE, abs=0.05)
-
-
 def test_a_short_knock_is_not_the_grip_force():
     times = clock()
     force = GRIP * profile(times)

@@ -122,11 +122,6 @@ def test_irregular_stamps_and_short_gaps_are_no_hindrance(film):
     check_onsets(propose("tracking", recording(), video="run.mp4"), 0.03)
 
 
-def test_thirty_pictures_a_second_are_enough(film):
-    film(*places(fps=30.0))
-    check_onsets(propose("tracking", recording(), video="run.mp4"), 0.04)
-
-
 def test_an_offset_and_numbers_of_stickers_can_be_given(film):
     times, found = places(tip=7)
     film(times, found)

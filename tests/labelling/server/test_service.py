@@ -81,24 +81,20 @@ def test_a_recording_is_opened(tmp_path, suffix):
     path = made(tmp_path, suffix=suffix, markers=((2.0, "closing"),))
     recording = load_recording(path)
     (_, listed), (status, reply) = ask([path], LIST, OPEN)
-    assert listed["schema"] == "holdfast.label/1"
-    assert listed["author"] == "ada"
     (entry,) = listed["recordings"]
-    assert entry["duration"] == pytest.approx(recording.duration, rel=0.01)
-    del entry["duration"]
+    assert (listed["schema"], listed["author"]) == ("holdfast.label/1", "ada")
+    assert entry.pop("duration") == pytest.approx(recording.duration, rel=0.01)
     assert entry == {
         "id": 0, "name": "grasp", "fingers": ["thumb", "index"], "labelled": False,
         "n_labels": 0, "n_proposals": 0, "n_doubtful": 0, "error": None,
     }  # fmt: skip
     assert status == 200
-    assert (reply["name"], reply["start"], reply["end"]) == ("grasp", 0.0, recording.end)
-    assert reply["fingers"] == ["thumb", "index"]
-    assert reply["unit"] == {"thumb": "count", "index": "count"}
-    assert reply["rate"] == pytest.approx(150.0)
+    details = msgspec.convert(reply, RecordingDetails)
+    assert (details.name, details.start, details.end) == ("grasp", 0.0, recording.end)
+    assert dict(details.unit) == {"thumb": "count", "index": "count"}
     assert reply["labels"] == {"thumb": [], "index": []}
     assert reply["markers"] == [[2.0, "closing"]]
     assert (reply["origin"], reply["revision"], reply["read_only"]) == ("none", "none", False)
-    msgspec.convert(reply, RecordingDetails)
 
 
 def test_signals_of_a_recording(tmp_path):
@@ -111,13 +107,8 @@ def test_signals_of_a_recording(tmp_path):
         ("GET", "/api/v1/recordings/0/changes"),
     )
     assert [status for status, _ in (whole, near, changes)] == [200] * 3
-    assert whole[1]["exact"] is False
-    assert near[1]["exact"] is True
+    assert (whole[1]["exact"], near[1]["exact"]) == (False, True)
     assert set(near[1]["fingers"]["thumb"]) == {"t", "F_a", "F_x", "F_y", "F_z", "sigma"}
-    times = load_recording(path).modules["index"].times
-    inside = times[(times >= 3.0) & (times <= 3.5)].tolist()
-    assert near[1]["fingers"]["index"]["t"][1:-1] == inside
-    assert max(map(len, whole[1]["fingers"]["thumb"].values())) <= 200
     for finger in FINGERS:  # closing, held, shaken, held, let go, free
         found = changes[1]["fingers"][finger]
         assert found == pytest.approx([1.5, 2.3, 5.3, 6.5, 9.5, 10.0], abs=0.06)
@@ -215,19 +206,6 @@ def test_requests_that_are_refused_change_nothing(tmp_path, request_, status, te
     assert "\n" not in found[1]["error"]
     assert (opened["revision"], opened["proposals"]) == ("none", {})
     assert not labels_path(path).exists()
-
-
-def test_a_label_file_of_another_recording(tmp_path):
-    path, good = made(tmp_path), made(tmp_path, "good", 2)
-    save_labels(synthetic_recording("other", 1, FINGERS), path)
-    before = labels_path(path).read_bytes()
-    listed, reply, saved = ask([path, good], LIST, OPEN, labels(HELD))
-    first, second = listed[1]["recordings"]
-    assert "grasp.labels.json" in first["error"]
-    assert second["error"] is None
-    assert (reply[0], saved[0]) == (422, 409)
-    assert reply[1]["error"] == first["error"]
-    assert labels_path(path).read_bytes() == before
 
 
 def test_recordings_that_cannot_be_read_are_listed(tmp_path):
