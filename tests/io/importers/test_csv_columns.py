@@ -20,24 +20,18 @@ def header(form, n=3, modules=("",), first=0):
     ]
 
 
-@pytest.mark.parametrize(
-    ("names", "text"),
-    [
-        (["time", *header("F{axis}{taxel}")], "time=time,taxels=F{axis}{taxel}"),
-        (["t", *header("t{taxel}_{axis}", first=1)], "time=t,taxels=t{taxel}_{axis}"),
-        (["Timestamp (ms)", *header("s{taxel}.{axis}")], "taxels=s{taxel}.{axis}"),
-        (["stamp", *header("{axis}{taxel}"), "index"], "time=stamp,taxels={axis}{taxel}"),
-        (
-            ["my_time", "label", *header("{module}_{taxel}_{axis}", modules=("thumb", "index"))],
-            "time=my_time,taxels={module}_{taxel}_{axis},label=label",
-        ),
-        (
-            ["t", *header("f{module}_t{taxel}{axis}", 4, modules=(1, 2, 3))],
-            "time=t,taxels={module}_t{taxel}{axis}",
-        ),
-        (["t", "FX", "FY", "FZ"], "time=t,taxels=F{axis}"),
-    ],
-)
+LONG = ["my_time", "label", *header("{module}_{taxel}_{axis}", modules=("thumb", "index"))]
+GUESSES = [
+    (["t", *header("t{taxel}_{axis}", first=1)], "time=t,taxels=t{taxel}_{axis}"),
+    (["Timestamp (ms)", *header("s{taxel}.{axis}")], "taxels=s{taxel}.{axis}"),
+    (["stamp", *header("{axis}{taxel}"), "index"], "time=stamp,taxels={axis}{taxel}"),
+    (LONG, "time=my_time,taxels={module}_{taxel}_{axis},label=label"),
+    (["t", *header("f{module}_t{taxel}{axis}", 4, modules=(1, 2, 3))], "{module}_t{taxel}{axis}"),
+    (["t", "FX", "FY", "FZ"], "time=t,taxels=F{axis}"),
+]
+
+
+@pytest.mark.parametrize(("names", "text"), GUESSES)
 def test_a_guess_from_the_header(names, text):
     assert text in str(Columns().completed(names, ()))
 
@@ -70,12 +64,8 @@ def test_a_guess_is_read_back_from_its_text():
 def test_consecutive_columns():
     names = ["t", *(f"ch{k}" for k in range(6))]
     layout = Columns(taxels="ch0..ch5").layout(names)
-    assert layout == {
-        "": {
-            (1, "x"): "ch0", (1, "y"): "ch1", (1, "z"): "ch2",
-            (2, "x"): "ch3", (2, "y"): "ch4", (2, "z"): "ch5",
-        }
-    }  # fmt: skip
+    places = [(taxel, axis) for taxel in (1, 2) for axis in "xyz"]
+    assert layout == {"": dict(zip(places, names[1:], strict=True))}
 
 
 def test_a_rate_in_place_of_times():

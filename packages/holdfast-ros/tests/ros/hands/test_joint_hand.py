@@ -14,7 +14,7 @@ from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 from holdfast_ros.hands import ros_hand
 
-from .drivers import AH_NAMES, EFFORTS, ROS2, THUMB_FIRST, V4
+from .drivers import EFFORTS, ROS2, V4
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
@@ -44,16 +44,6 @@ class TestBeginOfTheGrip:
             hand.send(COMMAND)
             expected = {"thumb": 1.2, "index": 1.0, "middle": 1.0, "ring": 1.0}
             assert ROS2["v4"].meaning(peer.wait(1)) == pytest.approx(expected)
-
-    def test_other_names_are_refused_unless_they_are_given(self, driver, impatient):
-        names = [name.replace("ah", "left") for name in AH_NAMES]
-        driver(ROS2["v4"], names=names)
-        with pytest.raises(HandError, match=r"no joint ah_joint00 \(there are arm_1, left_joint33"):
-            open_hand("ros2:v4").open()
-        parts = (names[4 * k : 4 * k + 4] for k in range(4))
-        order = [":".join([f, *part]) for f, part in zip(THUMB_FIRST, parts, strict=True)]
-        with open_hand(f"ros2:v4?joints={','.join(order)}") as hand:
-            hand.send(COMMAND)
 
     def test_set_points_stay_within_the_joints_limits(self, driver):
         peer = driver(ROS2["v4"])

@@ -53,7 +53,7 @@ def test_a_grip_that_would_close_beyond_the_end_is_refused(driver):
 
 def test_another_joint_is_refused(driver, impatient):
     driver(ROS2["width-gripper"], names=AH_NAMES)
-    with pytest.raises(HandError, match=r"no joint finger_joint"):
+    with pytest.raises(HandError, match="no joint finger_joint"):
         open_hand(WIDTH).open()
 
 
