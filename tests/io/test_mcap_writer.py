@@ -128,16 +128,6 @@ def test_flushed_samples_are_on_disk(tmp_path):
     assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 30)
 
 
-def test_a_marker_may_be_written_with_later_samples(tmp_path):
-    path = tmp_path / "a.mcap"
-    with RecordingWriter(path, {"thumb": ANYSKIN}) as writer:
-        before = writer.n_bytes
-        writer.mark(0.0, "later", at_once=False)
-        assert writer.n_bytes == before
-        writer.append("thumb", np.arange(100) / 100, readings(100))
-        assert load_recording(path).markers == ((0.0, "later"),)
-
-
 def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
     """An end would make a damaged file of one that is merely cut."""
     path = tmp_path / "a.mcap"

@@ -159,8 +159,3 @@ def test_what_is_odd(tmp_path, recording, expected):
 def test_gaps_are_named_with_their_times(tmp_path):
     (gaps, _) = oddities_of(timed(with_gap, "thumb"), tmp_path / "a.mcap")
     assert gaps[2].startswith("2 gaps: 0.257 s at 3.00 s, 0.107 s at 4.")
-
-
-def test_labels_of_one_finger_are_labels(tmp_path):
-    name = next(iter(UNLABELLED.modules))
-    assert oddities_of(UNLABELLED.with_labels({name: GRASP.modules[name].labels}), tmp_path) == []

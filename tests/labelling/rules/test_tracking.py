@@ -202,18 +202,6 @@ def test_unreliable_clocks_halve_the_confidence():
     assert label.confidence <= 0.5
 
 
-def test_displacement_is_unstable_until_the_object_is_back():
-    times = clock()
-    way = slide(times, ((PUSH, PUSHED),)) - slide(times, ((8.0, 8.8),))
-    rule = TrackingRule(measure="displacement", distance=0.008)
-    labels = tracking.propose(tracked(poses(times, way)), rule=rule)["thumb"]
-    states = drawn(labels)
-    assert [state for state, *_ in states] == [
-        "NO_CONTACT", "STABLE", "UNSTABLE", "STABLE", "NO_CONTACT",
-    ]  # fmt: skip
-    assert states[2][1:] == pytest.approx([PUSH + 0.4, 8.6], abs=EDGE)
-
-
 def test_labels_of_the_recording_are_ignored():
     recording = sliding()
     labels = tracking.propose(recording)

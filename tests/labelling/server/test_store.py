@@ -191,11 +191,6 @@ def test_invalid_labels(given, text):
         parse_labels({"thumb": [given]})
 
 
-def test_valid_labels():
-    given = LabelInput(4.0, 5.0, "unstable", "lost", "seen", 0.7, "eve")
-    assert parse_labels({"thumb": [given], "index": []}) == {"thumb": (LOST,), "index": ()}
-
-
 def test_a_read_only_file(bare):
     recording, path = bare
     first = save(bare, {"thumb": [HELD]})

@@ -10,37 +10,11 @@ from holdfast_grip import FingerCommand, GripCommand, Limits, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands import open_hand
 
-from .drivers import AH_NAMES, POSITIONS, ROS2
+from .drivers import AH_NAMES, ROS2
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("domain")]
 
 WIDTH = ROS2["width-gripper"].uri
-BEGIN = 0.08 * (0.8 - POSITIONS[0]) / 0.8
-"""Width when the grip begins [m]: its joint is open at 0 rad, and at 0.8 rad closed by 80 mm."""
-
-
-@pytest.mark.parametrize(
-    ("scale", "uri", "narrower"),
-    [(1.0, "", 0.0), (2.0, "", 4.0 / 2000), (2.0, "&gain=4000", 4.0 / 4000 + 4.0 / 2000)],
-    ids=["begins at its width", "stiffness", "gain of a soft gripper"],
-)
-def test_each_newton_more_is_narrower(driver, scale, uri, narrower):
-    peer = driver(ROS2["width-gripper"])
-    with open_hand(WIDTH + uri) as hand:
-        hand.check(Limits(max_scale=2.0), ["thumb"])
-        hand.send(GripCommand(1.0, LoopState.REACT, {"thumb": FingerCommand(scale)}))
-        ((_, message),) = peer.wait(1)
-    assert message["joint_names"] == ["finger_joint"]
-    width = 0.08 * (0.8 - message["points"][0]["positions"][0]) / 0.8
-    assert BEGIN - width == pytest.approx(narrower)
-
-
-def test_a_width_is_within_the_stroke(driver):
-    peer = driver(ROS2["width-gripper"])
-    with open_hand(WIDTH.replace("=2000", "=100")) as hand:
-        hand.send(GripCommand(1.0, LoopState.RELAX, {"thumb": FingerCommand(0.0)}))
-        _, message = peer.wait(1)[-1]
-    assert list(message["points"][0]["positions"]) == [0.0]
 
 
 def test_a_grip_that_would_close_beyond_the_end_is_refused(driver):

@@ -83,10 +83,3 @@ def test_given_efforts_are_checked_at_start_up(uri, message):
     with pytest.raises(ValueError, match=message):
         hand.check(Limits(max_scale=2.0), ["thumb"])
     hand.check(Limits(max_scale=1.5), ["thumb"])
-
-
-def test_a_ros_2_topic_by_its_domain(monkeypatch):
-    monkeypatch.setenv("ROS_DOMAIN_ID", "7")
-    uri = "ros2:gripper?topic=/grip&effort=1&max_effort=2"
-    assert open_hand(uri).resource == open_hand(f"{uri}&domain=7").resource
-    assert open_hand(uri).resource != open_hand(f"{uri}&domain=0").resource

@@ -19,20 +19,10 @@ from holdfast.sensors import sensor
 from holdfast_ros import dds
 from holdfast_ros.sensor_messages import known_definition
 from holdfast_ros.sources import ros2
-from ros.domains import new_domain
 from ros_messages import PILLARS, sensor_state, store
 
 PEER = Path(__file__).parents[1] / "ros2_peer.py"
 N = 300
-
-
-@pytest.fixture
-def domain(monkeypatch):
-    """A domain of this test alone, on this machine alone."""
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    number = new_domain()
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    return number
 
 
 @contextmanager
@@ -136,7 +126,7 @@ def test_a_topic_that_cannot_be_read(domain, monkeypatch):
 
 
 def test_a_configuration_of_dds_that_is_none(monkeypatch):
-    domain = 97  # DDS reads its configuration when the first node of the process joins a domain
+    domain = 231  # DDS reads its configuration when the first node of the process joins a domain
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>")
     with pytest.raises(SourceError, match=f"^ROS domain {domain} cannot be joined: "):
