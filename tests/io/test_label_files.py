@@ -1,5 +1,6 @@
 import os
 import re
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -115,14 +116,6 @@ def test_labels_are_not_overwritten_unless_forced(saved):
     save_labels(recording, path, force=True)
 
 
-def test_times_of_any_kind_of_number_come_back_from_csv(tmp_path):
-    path = tmp_path / "labels.csv"
-    label = Label(np.float64(0.1), np.float32(0.5), ContactState.STABLE)
-    path.write_text(labels_to_csv({"thumb": [label]}))
-    (got,) = labels_from_csv(path)["thumb"]
-    assert (got.start, got.end) == (0.1, 0.5)
-
-
 @pytest.mark.parametrize(
     "finger", ["=1+1", "+1", "-1", "@A1", "\t=1", "\r=1", "'=1", "a\rb", "'a'"]
 )
@@ -135,7 +128,8 @@ def test_a_finger_is_no_formula_in_csv_and_comes_back(tmp_path, finger):
 
 def test_csv_goes_out_and_comes_in(tmp_path):
     path = tmp_path / "labels.csv"
-    path.write_text(labels_to_csv({"thumb": MINE, "index": MINE[:1]}))
+    numpy = replace(MINE[0], start=np.float64(0.5), end=np.float32(1.0))
+    path.write_text(labels_to_csv({"thumb": (numpy, MINE[1]), "index": MINE[:1]}))
     assert path.read_text().splitlines()[:2] == [
         "finger,start,end,state,cause",
         "thumb,0.5,1.0,unstable,slip",
@@ -185,7 +179,7 @@ def test_any_flipped_bit_is_found(make_recording, tmp_path):
     raw = path.read_bytes()
     modules = load_labels(path).modules
     n_harmless = 0
-    for place in range(0, 8 * len(raw), 3):
+    for place in range(0, 8 * len(raw), 7):
         damaged = bytearray(raw)
         damaged[place // 8] ^= 1 << place % 8
         path.write_bytes(damaged)
@@ -194,7 +188,7 @@ def test_any_flipped_bit_is_found(make_recording, tmp_path):
             n_harmless += 1
         except RecordingError:
             continue
-    assert n_harmless < 50  # 2.0 and 2.00, or a space and another space
+    assert n_harmless < 25  # 2.0 and 2.00, or a space and another space
 
 
 def test_a_file_without_a_digest_is_read_and_an_edited_one_is_refused(make_recording, tmp_path):

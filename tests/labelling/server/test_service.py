@@ -7,7 +7,7 @@ import pytest
 from aiohttp import ClientSession, web
 
 from holdfast.contact import ContactState
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_labels
 from holdfast.labelling.server.documents import RecordingDetails
 from holdfast.labelling.server.service import LabellingService
 from holdfast.labelling.server.workspace import Workspace
@@ -15,9 +15,9 @@ from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 
+from .build import FINGERS, NOW, made
+
 PATIENCE = 60.0
-NOW = "2026-01-02T03:04:05+00:00"
-FINGERS = ("thumb", "index")
 HELD = {"start": 3.0, "end": 4.0, "state": "stable"}
 SLIP = {"start": 4.0, "end": 4.5, "state": "unstable", "cause": "slip", "author": "eve"}
 
@@ -56,14 +56,6 @@ def ask(paths, *requests, **words):
         return found
 
     return run(work())
-
-
-def made(folder, name="grasp", seed=0, suffix=".parquet", bare=True, **changes):
-    """Save a synthetic recording and return its path."""
-    recording = replace(synthetic_recording(name, seed, FINGERS), **changes)
-    path = folder / f"{name}{suffix}"
-    save_recording(recording.with_labels({}) if bare else recording, path)
-    return path
 
 
 def labels(*thumb, revision="none", **words):

@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_labels
 from holdfast.labelling.server import store
 from holdfast.labelling.server.store import (
     ConflictError,
@@ -26,27 +26,24 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
+from .build import NOW, made
+
 HELD = Label(3.0, 4.0, ContactState.STABLE)
 LOST = Label(4.0, 5.0, ContactState.UNSTABLE, Cause.LOST, "seen", 0.7, "eve")
-NOW = "2026-01-02T03:04:05+00:00"
 
 
-@pytest.fixture(params=["parquet", "mcap"])
+@pytest.fixture(params=[".parquet", ".mcap"])
 def labelled(request, tmp_path):
     """A recording with labels inside, and its path."""
-    recording = synthetic_recording("grasp", 0, ("thumb", "index"))
-    path = tmp_path / f"grasp.{request.param}"
-    save_recording(recording, path)
-    return recording, path
+    path = made(tmp_path, suffix=request.param, bare=False)
+    return load_recording(path), path
 
 
 @pytest.fixture
 def bare(tmp_path):
     """A recording without labels, and its path."""
-    recording = synthetic_recording("bare", 0, ("thumb", "index")).with_labels({})
-    path = tmp_path / "bare.parquet"
-    save_recording(recording, path)
-    return recording, path
+    path = made(tmp_path, "bare")
+    return load_recording(path), path
 
 
 def save(place, labels, revision="none", **words):

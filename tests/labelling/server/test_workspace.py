@@ -14,14 +14,7 @@ from holdfast.live.recorder import Recorder
 from holdfast.recordings import Truth
 from holdfast.synthetic import synthetic_recording
 
-NOW = "2026-01-02T03:04:05+00:00"
-FINGERS = ("thumb", "index")
-
-
-def made(folder, name, seed=0):
-    path = folder / f"{name}.parquet"
-    save_recording(synthetic_recording(name, seed, FINGERS).with_labels({}), path)
-    return path
+from .build import FINGERS, NOW, made
 
 
 def workspace_of(*paths, **words):
@@ -147,9 +140,7 @@ def test_files_that_are_not_beside_it(tmp_path, name):
 
 @pytest.fixture(params=["parquet", "mcap"])
 def path(request, tmp_path):
-    path = tmp_path / f"grasp.{request.param}"
-    save_recording(synthetic_recording("grasp", 0, FINGERS), path)
-    return path
+    return made(tmp_path, suffix=f".{request.param}", bare=False)
 
 
 def check(path):

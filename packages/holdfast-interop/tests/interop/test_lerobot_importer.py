@@ -55,7 +55,7 @@ def test_several_rates_labels_truth_markers_and_media_come_back(
     assert_same(read, recording)
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), fps=st.sampled_from([1, 7]))
 def test_any_recording_comes_back(data, fps, recordings, assert_same, tmp_path_factory):
     recording = data.draw(recordings)
