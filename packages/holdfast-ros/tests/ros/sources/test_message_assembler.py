@@ -102,12 +102,20 @@ class TestModules:
 
 
 class TestTimes:
-    def test_stamps_of_the_device(self):
-        packets = [[uskin(k)] for k in range(5)]
+    @pytest.mark.parametrize(
+        ("time", "stamp", "start"),
+        [(EPOCH, 7.0, EPOCH), (1e300, None, 50.0), (None, 7.0, 7.0), (None, None, 50.0)],
+        ids=["device", "thousands of years away", "header", "host"],
+    )
+    def test_the_best_stamp_counts(self, time, stamp, start):
+        def later(first, k):
+            return None if first is None else first + 0.01 * k
+
+        packets = [[uskin(k, time=0, stamp=later(stamp, k))] for k in range(5)]
+        packets = [[one._replace(time=later(time, k))] for k, (one,) in enumerate(packets)]
         arrivals = taken(identified(*packets[0]), packets)
-        np.testing.assert_allclose(
-            [a.time - EPOCH for a in arrivals], 0.01 * np.arange(5), atol=1e-6
-        )
+        found = [a.time - start for a in arrivals]
+        np.testing.assert_allclose(found, 0.01 * np.arange(5), atol=1e-6)
         assert [int(a.samples["finger1"][0, 0]) for a in arrivals] == list(range(5))
 
     @pytest.mark.parametrize("wrong", [1e300, -1e300, 1e12, np.nan])
@@ -118,20 +126,6 @@ class TestTimes:
         assert [a.n_refused for a in arrivals] == [0] * 4 + [1] + [0] * 5
         times = [a.time - EPOCH for a in arrivals if a.samples]
         np.testing.assert_allclose(times, [0.01 * k for k in range(10) if k != 4], atol=1e-6)
-
-    def test_a_first_stamp_that_is_thousands_of_years_away_is_not_used(self):
-        packets = [[uskin(k, time=1e300)] for k in range(5)]
-        arrivals = taken(identified(*packets[0]), packets)
-        np.testing.assert_allclose([a.time for a in arrivals], 50.0 + 0.01 * np.arange(5))
-
-    def test_stamps_of_the_header_or_of_the_host(self):
-        for stamp, start in ((7.0, 7.0), (None, 50.0)):
-            packets = [
-                [uskin(k, time=np.nan)._replace(time=None, stamp=stamp and stamp + 0.01 * k)]
-                for k in range(3)
-            ]
-            arrivals = taken(identified(*packets[0]), packets)
-            np.testing.assert_allclose([a.time for a in arrivals], start + 0.01 * np.arange(3))
 
     def test_a_message_without_time_among_others_with(self):
         assembler = identified(uskin(0), uskin(0, 2))
