@@ -293,7 +293,7 @@ def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
 
 def test_an_array_that_unpacks_to_more_than_the_memory(tmp_path):
     file = npz(tmp_path / "a", F=READINGS)
-    np.savez_compressed(file, F=np.zeros((10**8, 15), np.uint8), t=TIMES)
+    np.savez_compressed(file, F=np.zeros((73 * 10**6, 15), np.uint8), t=TIMES)
     with pytest.raises(RecordingError, match="memory"):
         imported(file, {"F": SKIN})
 

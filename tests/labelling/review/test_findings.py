@@ -139,7 +139,7 @@ CASES = {
     "no labels": (UNLABELLED, [NO_LABELS]),
     "gaps": (timed(with_gap, "thumb"), [("thumb", "gaps"), NO_LABELS]),
     "a unit": (
-        timed(lambda times: times * 1e3),
+        timed(lambda times: times * 50),
         [(n, kind) for kind in ("unlikely_rate", "rate") for n in UNLABELLED.modules] + [NO_LABELS],
     ),
     "clocks": (timed(lambda t: t * 1.002, "index"), [("index", "clock_drift"), NO_LABELS]),

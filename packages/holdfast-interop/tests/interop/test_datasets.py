@@ -67,6 +67,13 @@ def test_the_list(capsys):
     assert (document["licence"], document["size"], document["tried"]) == ("MIT", 26_000_000, True)
 
 
+@pytest.mark.parametrize("words", [(), ("list", "gtac-grasps")])
+def test_the_list_as_text(capsys, words):
+    code, out, _ = VERB.run(capsys, *words)
+    assert code == 0
+    assert "gtac" in out
+
+
 def test_from_the_registry_to_recordings(capsys, made_up, cache):
     document = document_of(capsys, "get", "made-up", "out")
     assert (document["n_files"], document["n_unchecked"], document["n_recordings"]) == (2, 2, 2)

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from command_line import Verb
 from holdfast.cli import main
 from holdfast.detector import detect
 from holdfast.detector.detection import STATE_BY_CODE
@@ -56,6 +57,15 @@ def file(grasp, tmp_path_factory):
     words = ["--format", "rerun", "--model", "builtin:noise-floor"]
     assert main(["export", str(folder / "grasp.mcap"), str(folder / "view"), *words]) == 0
     return folder / "view" / "grasp.rrd"
+
+
+@pytest.mark.skipif(is_installed("rerun"), reason="Rerun is installed")
+def test_what_is_missing_is_one_line_with_the_command(capsys, grasp, tmp_path):
+    save_recording(grasp, tmp_path / "grasp.mcap")
+    words = (tmp_path / "grasp.mcap", tmp_path / "view", "--format", "rerun")
+    assert "pip install 'rerun-sdk>=0.41'" in Verb("export").refusal(capsys, *words)
+    words = ["builtin:any", str(tmp_path / "grasp.mcap"), "--rerun", "--port", "0", "--once"]
+    assert "rerun-sdk" in Verb("serve").refusal(capsys, *words)
 
 
 @needs_rerun

@@ -7,9 +7,10 @@ import pytest
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.errors import RecordingError
+from holdfast.io.definitions import parse_definition
 from holdfast.io.importers import read_poses
 from holdfast.labelling.rules.poses import poses_from_bag
-from holdfast_ros.bags import find_bags, open_bag, poses_of
+from holdfast_ros.bags import PoseDecoder, find_bags, open_bag, poses_of, standard_definition
 from ros.bag_writer import BagWriter, forget_definitions
 
 TF = {"TFMessage": "geometry_msgs/TransformStamped[] transforms"}
@@ -108,11 +109,19 @@ sys.addaudithook(_note)
 def test_bags_without_definitions_and_tracks_of_a_label_rule(tmp_path):
     path = a_pose_and_a_frame(empty_bag(tmp_path))
     forget_definitions(path)
+    with open_bag(path) as opened:
+        assert all(topic.definition is not None for topic in opened.topics)
     poses = poses_from_bag(path, "/marker", {"thumb": "thumb_tip"})
     assert (poses.object_track.times - 1e9).tolist() == [0, 0.25, 0.5, 0.75]
     assert poses.object_track.positions[:, 0].tolist() == [0, 1, 2, 3]
     assert poses.tip_tracks["thumb"].positions[:, 0].tolist() == [0, 0.5, 1, 1.5]
     assert not poses.same_clock
+
+
+def test_messages_without_poses():
+    assert standard_definition("pkg/String") is None
+    with pytest.raises(ValueError, match="pkg/Text has no poses"):
+        PoseDecoder(parse_definition("pkg/Text", "string text"), ros2=True)
 
 
 def test_missing_and_different_frames(bag):
