@@ -1,6 +1,5 @@
 """Plug-ins of other packages: found by name, loaded late, and named if they are skipped."""
 
-import functools
 import json
 import re
 import sys
@@ -99,23 +98,15 @@ def reports(caplog):
     return [record.getMessage() for record in caplog.records if record.name == "holdfast.plugins"]
 
 
-def test_each_kind_is_found_by_its_name(parts):
+def test_each_is_found_by_its_name_and_listed_after_our_own(parts, caplog):
     assert open_hand("grab:left").name == "grab:left"
     assert parse("gone://host")[0] == "gone"
-
-
-def test_names_are_listed_after_our_own(parts, caplog):
-    with pytest.raises(ValueError, match=r"FUNCTION; of plug-ins: grab, hollow, ros2$"):
+    with pytest.raises(ValueError, match="of plug-ins: grab, hollow, ros2"):
         open_hand("grip:left")
-    with pytest.raises(ValueError, match=r"there are xela:, twin:, serial:, gone:, mute:, "):
+    with pytest.raises(ValueError, match="xela:, twin:, serial:, gone:, mute:"):
         open_source("none:")
-    assert reports(caplog) == [
-        "plug-in twin (sources of acme 1.2) is skipped: holdfast itself has twin; another name "
-        "expected"
-    ]
-
-
-def test_a_plug_in_cannot_replace_our_own(parts):
+    (report,) = reports(caplog)
+    assert report.startswith("plug-in twin (sources of acme 1.2) is skipped")
     assert open_source("twin:").name == "twin:"
 
 
@@ -127,48 +118,39 @@ def test_nothing_is_imported_before_it_is_used(parts):
 
 
 @pytest.mark.parametrize(
-    ("use", "reason"),
-    [
-        (lambda: open_source("gone://h"), "gone (sources of acme 1.2) is skipped: "
-         "ModuleNotFoundError: No module named 'no_such_module'"),
-        (lambda: open_source("number:"), "number (sources of acme 1.2) is skipped: TypeError: a "
-         "function source(address) expected for number:, 'parts' given"),
-        (lambda: open_source("mute:"), "mute (sources of acme 1.2) is skipped: Mute"),
-        (lambda: open_source("odd:"), "odd (sources of acme 1.2) is skipped: GeneratorExit"),
-    ],
-)  # fmt: skip
-def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, use, reason):
-    with pytest.raises(ValueError, match=r"unknown|cannot be used; holdfast doctor says why"):
-        use()
-    assert any(text.startswith(f"plug-in {reason}") for text in reports(caplog))
+    ("name", "reason"),
+    [("gone", "no_such_module"), ("number", "parts"), ("mute", "Mute"), ("odd", "GeneratorExit")],
+)
+def test_one_that_cannot_be_used_is_named_and_skipped(parts, caplog, name, reason):
+    with pytest.raises(ValueError, match=r"unknown|holdfast doctor"):
+        open_source(f"{name}:")
+    begin = f"plug-in {name} (sources of acme 1.2) is skipped"
+    assert any(text.startswith(begin) and reason in text for text in reports(caplog))
 
 
-def test_what_is_no_hand_is_named_with_the_contract(parts):
-    text = "hollow:left: the plug-in hollow must return a subclass of HandDevice, as the contract"
-    with pytest.raises(ValueError, match=text):
+def test_what_is_no_hand_is_named(parts):
+    with pytest.raises(ValueError, match="plug-in hollow must return a subclass of HandDevice"):
         open_hand("hollow:left")
 
 
-def test_a_broken_importer_does_not_hinder_the_others(parts, caplog, capsys):
+def test_a_broken_importer_does_not_hinder_the_others(parts, caplog):
     (parts / "a.txt").write_text("hello")
     for _ in range(2):
-        with pytest.raises(
-            RecordingError, match=r"is of no supported format.*plug-ins:.* broken, .*half, "
-        ):
+        with pytest.raises(RecordingError, match=r"plug-ins:.* broken, .*half, "):
             import_recordings(parts / "a.txt")
     broken, half = reports(caplog)
-    assert broken == "plug-in broken (importers of acme 1.2) is skipped: RuntimeError: no device"
-    assert half.startswith("plug-in half (importers of acme 1.2) is skipped: TypeError: a module ")
-    with pytest.raises(ValueError, match="the plug-in of half cannot be used; holdfast doctor"):
+    assert broken.startswith("plug-in broken (importers of acme 1.2) is skipped")
+    assert broken.endswith("no device")
+    assert half.startswith("plug-in half (importers of acme 1.2) is skipped")
+    with pytest.raises(ValueError, match=r"half .*holdfast doctor"):
         import_recordings(parts / "a.txt", "half")
 
 
 def test_formats_of_packages_that_are_not_installed_are_named(tmp_path, monkeypatch):
     monkeypatch.setitem(PACKAGE_PARTS, "holdfast-far", {"importers": ("far",)})
-    with pytest.raises(ValueError, match=r"; not installed: far \(holdfast-far\)"):
+    with pytest.raises(ValueError, match=r"far \(holdfast-far\)"):
         import_recordings(tmp_path, "near")
-    text = r"the format far is part of holdfast-far, which is not installed: .*\[far\]|extra far"
-    with pytest.raises(HoldfastError, match=text):
+    with pytest.raises(HoldfastError, match=r"holdfast-far.*(\[far\]|extra far)"):
         import_recordings(tmp_path, "far")
 
 
@@ -205,32 +187,28 @@ def test_two_packages_with_one_name(tmp_path, monkeypatch, caplog):
     assert reports(caplog) == [f"plug-in thing (things of zeta 1.2) is skipped: {refusal}"]
 
 
-@pytest.mark.slow  # doctor imports each plug-in in a process of its own
-def test_doctor_lists_them(parts, capsys, monkeypatch):
-    monkeypatch.setattr(children, "answer_of_child", functools.cache(children.answer_of_child))
-    assert main(["doctor", "--json"]) == 0
-    plugins = json.loads(capsys.readouterr().out)["plugins"]
-    works = {plugin["name"] for plugin in plugins if not plugin["error"]}
+@pytest.mark.slow  # each plug-in is imported in a process of its own
+def test_doctor_lists_them(parts):
+    plugins = plugin_states()
+    works = {plugin.name for plugin in plugins if not plugin.error}
     assert works == {"grab", "hollow", "count"}
-    assert {plugin["package"] for plugin in plugins} == {"acme 1.2"}
-    assert main(["doctor"]) == 0
-    out = capsys.readouterr().out
-    assert "plug-in" in out
-    assert "SKIPPED: RuntimeError: no device" in " ".join(out.split())
+    assert {plugin.package for plugin in plugins} == {"acme 1.2"}
+    (broken,) = [plugin for plugin in plugins if plugin.name == "broken"]
+    assert broken.error.endswith("no device")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "error"),
     [
-        ("hang", "its import takes longer than 3 s"),
-        ("end", "its import ends the process"),
+        ("hang", "longer than 1 s"),
+        ("end", "ends the process"),
         ("odd", "GeneratorExit"),
     ],
 )
 def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     if name == "hang":
-        monkeypatch.setattr(children, "CHILD_TIMEOUT", 3.0)
+        monkeypatch.setattr(children, "CHILD_TIMEOUT", 1.0)
     points = {"holdfast.hands": {name: f"parts:{name}"}}
     install(tmp_path / "more", "bad", {"parts.py": PARTS}, points)
     with on_the_path(tmp_path / "more", monkeypatch):
@@ -238,19 +216,16 @@ def test_doctor_outlives_a_plug_in(tmp_path, monkeypatch, name, error):
     assert error in found[name]
 
 
-def test_a_kind_that_was_removed_is_named_with_what_to_use_instead(tmp_path, monkeypatch, capsys):
+def test_a_kind_that_was_removed_is_named_with_what_to_use_instead(tmp_path, monkeypatch):
     points = {f"holdfast.{kind}": {f"old-{kind}": "none:none"} for kind in REMOVED["plugins"]}
     install(tmp_path / "site", "acme", {}, points)
     monkeypatch.setattr(children, "answer_of_child", lambda *_: "")
     with on_the_path(tmp_path / "site", monkeypatch):
         with pytest.raises(ValueError, match="unknown sensor"):
             sensor("old-sensors")
-        assert main(["doctor"]) == 0
-    out = capsys.readouterr().out
+        errors = {plugin.name: plugin.error for plugin in plugin_states()}
     for kind, instead in REMOVED["plugins"].items():
-        (line,) = [line for line in out.splitlines() if f"old-{kind} of acme 1.2" in line]
-        assert f"the kind {kind} of plug-ins was removed" in line
-        assert line.endswith(instead)
+        assert errors[f"old-{kind}"].endswith(instead)
 
 
 def test_without_the_package_of_hands_doctor_lists_none(parts, monkeypatch):
@@ -261,7 +236,7 @@ def test_without_the_package_of_hands_doctor_lists_none(parts, monkeypatch):
 
 def test_help_lists_verbs_of_plug_ins_and_imports_none(parts, capsys):
     assert main(["--help"]) == 0
-    assert " count A verb of a plug-in. " in " ".join(capsys.readouterr().out.split())
+    assert " count " in capsys.readouterr().out
     assert "parts" not in sys.modules
     assert main(["count", "--to", "3"]) == 0
     assert capsys.readouterr().out == "1 2 3\n"
@@ -269,11 +244,8 @@ def test_help_lists_verbs_of_plug_ins_and_imports_none(parts, capsys):
 
 def test_a_verb_that_cannot_be_used_is_one_line(parts, capsys, caplog):
     assert main(["sum"]) == 2
-    assert capsys.readouterr().err.endswith(
-        "holdfast: the plug-in of the verb sum cannot be used; the line before, and holdfast "
-        "doctor, have the reason\n"
-    )
-    assert "a function expected for the verb sum" in reports(caplog)[-1]
+    assert "verb sum" in capsys.readouterr().err
+    assert "verb sum" in reports(caplog)[-1]
 
 
 EXTENSIONS = (
@@ -298,8 +270,7 @@ def test_what_adds_options_needs_them_and_its_function(group, function, tmp_path
     with on_the_path(site, monkeypatch):
         assert group.error("whole") == ""
         for name in ("empty", "odd"):
-            wanted = f"OPTIONS, a dataclass with its defaults, and {function} expected for {name}"
-            assert wanted in group.error(name)
+            assert re.search(f"OPTIONS.*{function} expected for {name}", group.error(name))
 
 
 def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, capsys):
@@ -308,12 +279,9 @@ def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, 
     install(tmp_path / "site", "holdfast-lab", {}, points)
     with on_the_path(tmp_path / "site", monkeypatch):
         assert main(["trial", "--help"]) == 2
-    version = metadata.version("holdfast")
     assert caplog.text == ""
-    assert capsys.readouterr().err == (
-        f"holdfast: the verb trial cannot be used: holdfast-lab 1.2 given, {version} expected as "
-        "of holdfast itself: clone the repository of holdfast, and run `uv run holdfast` there\n"
-    )
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"holdfast-lab 1.2 given, {metadata.version('holdfast')} expected" in line
 
 
 @pytest.fixture
@@ -332,10 +300,9 @@ def run(tmp_path, monkeypatch, capsys):
         yield run
 
 
-@pytest.mark.slow  # doctor imports each plug-in in a process of its own
+@pytest.mark.slow  # each plug-in is imported in a process of its own
 def test_the_template_is_listed_by_doctor(run):
-    plugins = json.loads(run("doctor", "--json"))["plugins"]
-    assert [(plugin["kind"], plugin["name"], plugin["error"]) for plugin in plugins] == [
+    assert [(plugin.kind, plugin.name, plugin.error) for plugin in plugin_states()] == [
         ("sources", "pins", ""),
         ("importers", "pins-log", ""),
     ]
@@ -350,8 +317,7 @@ def test_the_source_of_the_template(run, tmp_path):
     states = [json.loads(line)["state"] for line in lines]
     assert states[90] == "NO_CONTACT"
     assert states[-1] == "STABLE"
-    refused = run("record", "pins:?secs=2", "a.mcap", code=2)
-    assert refused == "holdfast: pins:?secs=2: unknown parameter secs; there are seconds\n"
+    assert "parameter secs" in run("record", "pins:?secs=2", "a.mcap", code=2)
 
 
 def test_the_format_of_the_template(run, tmp_path):
@@ -364,8 +330,7 @@ def test_the_format_of_the_template(run, tmp_path):
     loaded = holdfast.load_recording(tmp_path / imported["recordings"][0]["path"])
     np.testing.assert_allclose(loaded.modules["finger1"].readings.reshape(200, 18), rows[:, 1:])
     (tmp_path / "bad.pins").write_text("0.0 1 2\n")
-    text = run("import", "bad.pins", "bad", "--format", "pins-log", code=2)
-    assert text == "holdfast: bad.pins, line 1: 3 values, 19 expected\n"
+    assert "bad.pins, line 1" in run("import", "bad.pins", "bad", "--format", "pins-log", code=2)
 
 
 def test_every_kind_is_described():

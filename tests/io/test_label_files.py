@@ -1,5 +1,6 @@
 import os
 import re
+from dataclasses import replace
 
 import msgspec
 import numpy as np
@@ -75,13 +76,9 @@ def test_they_fit_the_recording_in_the_other_format(saved, tmp_path):
 def test_labels_of_another_recording_are_refused(saved, make_recording):
     _, path = saved
     save_recording(make_recording(seed=1), path, force=True)
-    with pytest.raises(RecordingError) as caught:
+    first, second = make_recording().digest[:12], make_recording(seed=1).digest[:12]
+    with pytest.raises(RecordingError, match=f"{labels_path(path)} .*{first}.*{second}"):
         load_recording(path)
-    want = make_recording().digest[:12], make_recording(seed=1).digest[:12]
-    assert str(caught.value) == (
-        f"{labels_path(path)} labels another recording ('can_1', hash {want[0]}) than "
-        f"can.parquet (hash {want[1]}): remove it or put its recording back"
-    )
 
 
 def changed(path, change):
@@ -94,14 +91,14 @@ def changed(path, change):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (lambda d: d.update(extra=1), "is not a label file: Object contains unknown field `extra`"),
-        (lambda d: d.update(schema="holdfast.labels/2"), "Invalid enum value 'holdfast.labels/2'"),
-        (lambda d: d["modules"]["thumb"][0].update(state="fine"), "Invalid enum value 'fine'"),
-        (lambda d: d["modules"]["thumb"][0].update(start="now"), "Expected `float`, got `str`"),
-        (lambda d: d["modules"]["thumb"][0].update(end=0.1), "a label ends after its start"),
-        (lambda d: d["modules"]["thumb"][0].update(confidence=2), "confidence from 0 to 1"),
-        (lambda d: d["modules"]["thumb"][1].update(end=1e3), "lies outside the recording"),
-        (lambda d: d["modules"].update(pinky=[]), "labels for pinky given; recording 'can_1' has"),
+        (lambda d: d.update(extra=1), "`extra`"),
+        (lambda d: d.update(schema="holdfast.labels/2"), "'holdfast.labels/2'"),
+        (lambda d: d["modules"]["thumb"][0].update(state="fine"), "'fine'"),
+        (lambda d: d["modules"]["thumb"][0].update(start="now"), "`float`"),
+        (lambda d: d["modules"]["thumb"][0].update(end=0.1), "[0.5, 0.1)"),
+        (lambda d: d["modules"]["thumb"][0].update(confidence=2), "confidence"),
+        (lambda d: d["modules"]["thumb"][1].update(end=1e3), "1000"),
+        (lambda d: d["modules"].update(pinky=[]), "pinky"),
     ],
 )
 def test_wrong_label_files_are_refused(saved, change, text):
@@ -112,28 +109,11 @@ def test_wrong_label_files_are_refused(saved, change, text):
     assert "can.labels.json" in str(caught.value)
 
 
-def test_invalid_json_is_refused(saved):
-    _, path = saved
-    labels_path(path).write_text("finger,start\n")
-    with pytest.raises(
-        RecordingError, match=r"can\.labels\.json is not a label file: JSON is malf"
-    ):
-        load_recording(path)
-
-
 def test_labels_are_not_overwritten_unless_forced(saved):
     recording, path = saved
     with pytest.raises(OutputError, match="exists already"):
         save_labels(recording, path)
     save_labels(recording, path, force=True)
-
-
-def test_times_of_any_kind_of_number_come_back_from_csv(tmp_path):
-    path = tmp_path / "labels.csv"
-    label = Label(np.float64(0.1), np.float32(0.5), ContactState.STABLE)
-    path.write_text(labels_to_csv({"thumb": [label]}))
-    (got,) = labels_from_csv(path)["thumb"]
-    assert (got.start, got.end) == (0.1, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +128,8 @@ def test_a_finger_is_no_formula_in_csv_and_comes_back(tmp_path, finger):
 
 def test_csv_goes_out_and_comes_in(tmp_path):
     path = tmp_path / "labels.csv"
-    path.write_text(labels_to_csv({"thumb": MINE, "index": MINE[:1]}))
+    numpy = replace(MINE[0], start=np.float64(0.5), end=np.float32(1.0))
+    path.write_text(labels_to_csv({"thumb": (numpy, MINE[1]), "index": MINE[:1]}))
     assert path.read_text().splitlines()[:2] == [
         "finger,start,end,state,cause",
         "thumb,0.5,1.0,unstable,slip",
@@ -165,22 +146,30 @@ def test_csv_goes_out_and_comes_in(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("finger,start,end\nthumb,0,1\n", "row 2: no state; the columns are finger,start,end,stat"),
-        ("finger,start,end,state\nthumb,a,1,stable\n", "row 2: could not convert string to float"),
-        ("finger,start,end,state\nthumb,0,1,fine\n", "row 2: 'FINE' is not a valid ContactState"),
-        ("finger,start,end,state\nthumb,1,0,stable\n", "row 2: a label ends after its start"),
+        ("finger,start,end\nthumb,0,1\n", "state"),
+        ("finger,start,end,state\nthumb,a,1,stable\n", "'a'"),
+        ("finger,start,end,state\nthumb,0,1,fine\n", "'FINE'"),
+        ("finger,start,end,state\nthumb,1,0,stable\n", r"\[1.0, 0.0\)"),
     ],
 )
 def test_wrong_csv_is_refused(tmp_path, text, message):
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(RecordingError, match=re.escape(f"a.csv, {message}")):
+    with pytest.raises(RecordingError, match=rf"a\.csv, row 2: .*{message}"):
         labels_from_csv(tmp_path / "a.csv")
 
 
-def test_missing_files(tmp_path):
-    for read in (labels_from_csv, load_labels):
-        with pytest.raises(RecordingError, match=r"cannot read .*: No such file"):
-            read(tmp_path / "none")
+@pytest.mark.parametrize("read", [load_labels, labels_from_csv])
+def test_files_that_cannot_be_read(tmp_path, read):
+    path = tmp_path / "a"
+    with pytest.raises(RecordingError, match="No such file"):
+        read(path)
+    path.write_text("finger,start\n1")
+    with pytest.raises(RecordingError, match=str(path)):
+        read(path)
+    path.unlink()
+    os.mkfifo(path)
+    with pytest.raises(RecordingError, match="a pipe"):
+        read(path)
 
 
 @pytest.mark.slow
@@ -190,7 +179,7 @@ def test_any_flipped_bit_is_found(make_recording, tmp_path):
     raw = path.read_bytes()
     modules = load_labels(path).modules
     n_harmless = 0
-    for place in range(0, 8 * len(raw), 3):
+    for place in range(0, 8 * len(raw), 7):
         damaged = bytearray(raw)
         damaged[place // 8] ^= 1 << place % 8
         path.write_bytes(damaged)
@@ -199,7 +188,7 @@ def test_any_flipped_bit_is_found(make_recording, tmp_path):
             n_harmless += 1
         except RecordingError:
             continue
-    assert n_harmless < 50  # 2.0 and 2.00, or a space and another space
+    assert n_harmless < 25  # 2.0 and 2.00, or a space and another space
 
 
 def test_a_file_without_a_digest_is_read_and_an_edited_one_is_refused(make_recording, tmp_path):
@@ -207,19 +196,8 @@ def test_a_file_without_a_digest_is_read_and_an_edited_one_is_refused(make_recor
     path = save_labels(recording, tmp_path / "a.parquet", author="ada")
     text = path.read_text()
     path.write_text(text.replace('"ada"', '"bob"'))
-    with pytest.raises(RecordingError) as refused:
+    with pytest.raises(RecordingError, match=f'{path} .*"digest"'):
         load_labels(path)
-    assert str(refused.value) == (
-        f"{path} does not match its digest: it is damaged, or was edited by hand; if you edited "
-        'it, remove its line "digest"'
-    )
     lines = [line for line in text.replace('"ada"', '"bob"').splitlines() if '"digest"' not in line]
     path.write_text("\n".join(lines).replace('"notes": "",', '"notes": ""'))
     assert load_labels(path).author == "bob"
-
-
-@pytest.mark.parametrize("read", [load_labels, labels_from_csv])
-def test_a_pipe_is_refused_at_once(tmp_path, read):
-    os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
-        read(tmp_path / "pipe")

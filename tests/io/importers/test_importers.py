@@ -13,24 +13,19 @@ FOLDERS = ("uskin-pick-move", "lerobot")
 
 
 def test_unknown_formats(tmp_path):
-    with pytest.raises(ValueError, match="unknown format 'bag'; there are xela-log, "):
+    with pytest.raises(ValueError, match="'bag'; there are xela-log, "):
         import_recordings(tmp_path, "bag")
 
 
 def test_a_file_of_no_known_format(tmp_path):
     (tmp_path / "a.txt").write_text("hello")
     for path in (tmp_path, tmp_path / "a.txt"):
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(RecordingError, match=rf"{path} .*{', '.join(FORMATS)}.*--sensor"):
             import_recordings(path)
-        assert str(caught.value) == (
-            f"{path} is of no supported format; there are {', '.join(FORMATS)}"
-            f"{IMPORTER_PLUGINS.text()} (--format); for a table or arrays of any other logger give "
-            "--sensor"
-        )
 
 
 def test_a_missing_path(tmp_path):
-    with pytest.raises(RecordingError, match="none does not exist; a file or folder to import"):
+    with pytest.raises(RecordingError, match="none does not exist"):
         import_recordings(tmp_path / "none", "csv")
 
 
@@ -51,23 +46,18 @@ def test_a_pointer_of_git_lfs_is_named(tmp_path):
     path = tmp_path / "a.h5"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:a2aef56b\n")
     for place, form in ((path, "arrays"), (path, None), (tmp_path, None)):
-        with pytest.raises(RecordingError) as caught:
+        with pytest.raises(RecordingError, match=rf"{path} .*git lfs pull"):
             list(import_recordings(place, form))
-        assert str(caught.value) == (
-            f"{path} is a pointer of Git LFS (63 bytes), not the data: in a clone, `git lfs pull` "
-            "fetches them"
-        )
 
 
 def test_a_pipe_is_refused_at_once(tmp_path):
     os.mkfifo(tmp_path / "a.csv")
-    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
+    with pytest.raises(RecordingError, match=r"a\.csv: it is a pipe"):
         import_recordings(tmp_path / "a.csv")
 
 
 def test_a_format_without_poses(tmp_path):
     path = tmp_path / "a.csv"
     path.write_text("time,finger1:1:x,finger1:1:y,finger1:1:z\n0,1,2,3\n")
-    with pytest.raises(RecordingError) as refusal:
+    with pytest.raises(RecordingError, match="of the format csv"):
         read_poses(path, {"object": "object"})
-    assert str(refusal.value) == f"{path} is of the format csv, from which no poses can be read"

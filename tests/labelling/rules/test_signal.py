@@ -45,12 +45,24 @@ def test_a_grasp_is_labelled_as_by_a_person():
 def test_labels_have_author_and_evidence():
     labels = signal.propose(grasp())["thumb"]
     assert {label.author for label in labels} == {"rule:signal"}
-    assert {re.sub(r"[\d.]+", "N", label.evidence) for label in labels} == {
-        "force N times under contact", "not settled, force N times contact",
-        "settled, N times under its limit", "force changes, N times the settled limit",
-        "force ends, N times the settled limit",
-    }  # fmt: skip
+    assert all(re.search(r"force.* [\d.]+ times|[\d.]+ times", x.evidence) for x in labels)
     assert all(0 < label.confidence < 1 for label in labels)
+
+
+def pushed(pushes):
+    """A hand of which each finger feels its own push."""
+    times = clock()
+    modules = {
+        name: module(times, GRIP * profile(times, push), seed)
+        for seed, (name, push) in enumerate(zip(("thumb", "index", "ring"), pushes, strict=False))
+    }
+    return signal.propose(Recording("push", modules))
+
+
+def of_thumb(force, times=None):
+    """Labels of a finger with that force over the grip force."""
+    thumb = module(clock() if times is None else times, GRIP * force)
+    return signal.propose(Recording("made", {"thumb": thumb}))["thumb"]
 
 
 @given(start=st.floats(-1e3, 1e9))
@@ -77,25 +89,13 @@ def test_labels_and_truth_are_ignored():
     assert signal.propose(labelled) == signal.propose(blind)
 
 
-def test_a_disturbance_of_two_fingers_applies_to_all():
+def test_a_disturbance_of_two_fingers_applies_to_all_one_of_a_finger_to_it_alone():
     times = clock()
-    modules = {
-        name: module(times, GRIP * profile(times, push), seed)
-        for seed, (name, push) in enumerate([("thumb", 0.2), ("index", 0.2), ("ring", 0.0)])
-    }
-    codes = label_states(signal.propose(Recording("push", modules))["ring"], times)
+    codes = label_states(pushed((0.2, 0.2, 0.0))["ring"], times)
     assert (codes[(times > PUSH) & (times < PUSHED)] == 2).mean() > 0.9
-
-
-def test_a_change_of_one_finger_applies_to_it_alone():
-    times = clock()
-    modules = {
-        name: module(times, GRIP * profile(times, push), seed)
-        for seed, (name, push) in enumerate([("thumb", 0.2), ("index", 0.0)])
-    }
-    labels = signal.propose(Recording("slip", modules))
+    labels = pushed((0.2, 0.0))
     check(labels["thumb"], EDGE)
-    assert "DISTURBANCE" not in [label.cause and label.cause.name for label in labels["index"]]
+    assert Cause.DISTURBANCE not in [label.cause for label in labels["index"]]
 
 
 def test_a_stronger_push_has_more_confidence():
@@ -106,45 +106,33 @@ def test_a_stronger_push_has_more_confidence():
     assert surety(0.02) < surety(0.05) < surety(0.5)
 
 
-def test_creep_is_no_contact():
+@pytest.mark.parametrize("kind", ["creep", "drift"])
+def test_creep_and_a_drifting_baseline_are_no_contact(kind):
     times = clock()
-    force = GRIP * profile(times)
-    after = times > FREE
-    force[after, 2] += 0.05 * GRIP * np.exp(-(times[after] - FREE) / 2)
-    for labels in signal.propose(Recording("creep", {"thumb": module(times, force)})).values():
-        check(labels, EDGE)
-
-
-def test_a_drifting_baseline_is_no_contact():
-    times = clock()
-    force = GRIP * profile(times)
-    force[:, 2] += 0.01 * GRIP * times / DURATION
-    for labels in signal.propose(Recording("drift", {"thumb": module(times, force)})).values():
-        check(labels, EDGE)
+    creep = 0.05 * np.exp(-(times - FREE) / 2) * (times > FREE)
+    force = profile(times)
+    force[:, 2] += creep if kind == "creep" else 0.01 * times / DURATION
+    check(of_thumb(force), EDGE)
 
 
 def test_two_grasps_are_two():
     times = clock()
-    once = profile(times)
-    twice = GRIP * np.concatenate([once, once])
-    both = np.concatenate([times, times + DURATION])
-    labels = signal.propose(Recording("twice", {"thumb": module(both, twice)}))["thumb"]
+    twice = np.concatenate([profile(times)] * 2)
     states = [state for state, _, _ in SPANS]
+    labels = of_thumb(twice, np.concatenate([times, times + DURATION]))
     assert [label.state.value for label in labels] == [*states, *states[1:]]
 
 
 def test_a_grasp_that_never_settles_is_closing_to_its_end():
     times = clock()
     wobble = 0.3 * np.sin(2 * np.pi * times) * (times > CLOSING) * (times < FREE)
-    force = GRIP * (profile(times, 0.0) + wobble[:, None] * [1, 0, 0])
-    labels = signal.propose(Recording("wobbly", {"thumb": module(times, force)}))["thumb"]
+    labels = of_thumb(profile(times, 0.0) + wobble[:, None] * [1, 0, 0])
     assert "STABLE" not in [label.state.value for label in labels]
 
 
 def test_a_sudden_end_of_the_force_is_a_loss():
     times = clock()
-    force = GRIP * profile(times, 0.0) * (times < RELEASE - 1)[:, None]
-    labels = signal.propose(Recording("dropped", {"thumb": module(times, force)}))["thumb"]
+    labels = of_thumb(profile(times, 0.0) * (times < RELEASE - 1)[:, None])
     assert labels[-2].cause is Cause.LOST
     assert abs(labels[-1].start - (RELEASE - 1)) < EDGE
 
@@ -160,22 +148,17 @@ def test_a_recording_that_begins_in_contact_is_held_until_the_force_drops_for_go
     assert abs(last.start - RELEASE) < EDGE
 
 
-def test_a_gap_has_no_label():
-    times = clock()
-    kept = (times < 4.0) | (times > 5.0)
-    part = module(times[kept], GRIP * profile(times)[kept])
-    labels = signal.propose(Recording("gap", {"thumb": part}))["thumb"]
+@pytest.mark.parametrize("kind", ["gap", "nan"])
+def test_a_gap_has_no_label(kind):
+    (thumb,) = grasp(fingers=("thumb",)).modules.values()
+    lost = (thumb.times > 4.0) & (thumb.times < 5.0)
+    if kind == "gap":
+        thumb = replace(thumb, times=thumb.times[~lost], readings=thumb.readings[~lost])
+    else:
+        thumb = replace(thumb, readings=np.where(lost[:, None, None], np.nan, thumb.readings))
+    labels = signal.propose(Recording("gap", {"thumb": thumb}))["thumb"]
     assert (label_states(labels, np.linspace(4.05, 4.95, 50)) == 0).all()
     assert (label_states(labels, np.array([3.5, 5.5])) == 3).all()
-
-
-def test_samples_that_are_not_finite_are_a_gap():
-    recording = grasp(fingers=("thumb",))
-    readings = recording.modules["thumb"].readings.copy()
-    readings[400:500] = np.nan
-    broken = Recording("nan", {"thumb": replace(recording.modules["thumb"], readings=readings)})
-    labels = signal.propose(broken)["thumb"]
-    assert (label_states(labels, np.linspace(4.05, 4.95, 50)) == 0).all()
 
 
 def test_a_dead_finger_has_no_labels_and_does_not_affect_others():
@@ -189,14 +172,9 @@ def test_a_dead_finger_has_no_labels_and_does_not_affect_others():
     check(labels["thumb"], EDGE)
 
 
-def test_labels_fit_the_recording():
-    recording = grasp()
-    assert recording.with_labels(signal.propose(recording)).modules["thumb"].labels
-
-
 def test_no_sample_for_the_tare():
     recording = grasp(fingers=("thumb",))
-    with pytest.raises(RecordingError, match=r"no finite sample to take the tare from \(20:21\)"):
+    with pytest.raises(RecordingError, match="20:21"):
         signal.propose(recording, tare=(20, 21))
 
 

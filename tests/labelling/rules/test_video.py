@@ -78,18 +78,28 @@ def slips_of(labels):
     return [label for label in labels if label.cause == "slip"]
 
 
+def offset_of(label):
+    """Offset of the clocks in the evidence of a label [s]."""
+    return float(label.evidence.split("later by ")[1].split()[0])
+
+
+def check_onsets(labels, within, finger="index"):
+    """Check that the slips of a finger begin where those of the film do."""
+    found = slips_of(labels[finger])
+    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=within)
+    return found
+
+
 def test_slips_are_found_and_yielding_is_none(film):
     film(*places())
     labels = propose("tracking", recording(), video="run.mp4")
     assert list(labels) == ["index"]  # no sticker of the thumb is in view
-    found = slips_of(labels["index"])
-    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.02)
+    found = check_onsets(labels, 0.02)
     for label, (onset, size) in zip(found, SLIPS, strict=True):
         assert label.end == pytest.approx(onset + 0.2, abs=0.06)
         distance = float(label.evidence.split()[1])
         assert distance == pytest.approx(size, abs=0.1)
-        offset = float(label.evidence.split("later by ")[1].split()[0])
-        assert offset == pytest.approx(SHIFT, abs=0.008)
+        assert offset_of(label) == pytest.approx(SHIFT, abs=0.008)
         assert "video run.mp4" in label.evidence
         assert label.author == "rule:tracking"
         assert label.confidence > 0.5
@@ -109,15 +119,7 @@ def test_irregular_stamps_and_short_gaps_are_no_hindrance(film):
     kept = np.random.default_rng(3).random(len(times)) > 0.1  # a tenth of the pictures is lost
     found[2][1200:1203] = np.nan
     film(times[kept], {number: place[kept] for number, place in found.items()})
-    labels = propose("tracking", recording(), video="run.mp4")
-    starts = [label.start for label in slips_of(labels["index"])]
-    assert starts == pytest.approx([s for s, _ in SLIPS], abs=0.03)
-
-
-def test_thirty_pictures_a_second_are_enough(film):
-    film(*places(fps=30.0))
-    found = slips_of(propose("tracking", recording(), video="run.mp4")["index"])
-    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.04)
+    check_onsets(propose("tracking", recording(), video="run.mp4"), 0.03)
 
 
 def test_an_offset_and_numbers_of_stickers_can_be_given(film):
@@ -127,72 +129,61 @@ def test_an_offset_and_numbers_of_stickers_can_be_given(film):
         "tracking", recording(), video="run.mp4", offset=SHIFT, bodies={"object": 0, "thumb": 7}
     )
     assert list(labels) == ["thumb"]
-    assert "later by 0.237 s (+/- 0.000)" in slips_of(labels["thumb"])[0].evidence
+    assert offset_of(slips_of(labels["thumb"])[0]) == SHIFT
+
+
+def changed(change, **words):
+    times, found = places(**words)
+    return change(times, found) or (times, found)
 
 
 def without(number):
-    times, found = places()
-    del found[number]
-    return times, found
+    return changed(lambda _, found: found.pop(number) is None)
 
 
-def hidden(number):
-    times, found = places()
-    found[number][500:] = np.nan
-    return times, found
+def hide(times, found):
+    found[0][500:] = np.nan
 
 
-def of_another_time():
-    times, found = places()
+def show_another_time(times, found):
     found[2][:, :, 2] = np.array([75.0, 12.0]) + 3 * forces(times, seed=9)[:, :2]
-    return times, found
 
 
-def with_lost_pictures():
+def lose_pictures(times, found):
     """Pictures that were dropped without a gap in the stamps."""
-    times, found = places()
     kept = np.arange(len(times)) % 50 < 49
     return times[: kept.sum()], {number: place[kept] for number, place in found.items()}
 
 
-def still():
-    times, found = places(slips=((0, 0),), elastic=0)
-    return times, found
-
-
-NOT_ALIKE = r"run\.mp4: its (motion is not that of|clock is known to \d+ ms only)"
+NOT_ALIKE = "its (motion is not that of|clock is known to)"
 BAD_FILMS = {
-    "no sticker": (lambda: (places()[0], {}), r"stickers seen in its 2340 pictures: none; that"),
-    "no object": (lambda: without(0), r"pictures: index \(2\) in 100%; that of the object \(0\)"),
-    "no finger": (lambda: without(2), r"pictures: object \(0\) in 100%; that of the object \(0\)"),
-    "hidden": (lambda: hidden(0), r"object \(0\) in 21%, index \(2\) in 100%; that of"),
-    "other size": (
-        lambda: places(tip_size=30.0),
-        r"sticker 2 \(index\) looks 2 times as large as 15 mm beside the 24 mm of the object; give",
-    ),
-    "other time": (of_another_time, r"run\.mp4: its motion is not that of recording 'pulls' at"),
-    "nothing moves": (still, NOT_ALIKE),
-    "lost pictures": (with_lost_pictures, NOT_ALIKE),
+    "no sticker": (lambda: (places()[0], {}), "none"),
+    "no object": (lambda: without(0), r"index \(2\) in 100%"),
+    "no finger": (lambda: without(2), r"object \(0\) in 100%"),
+    "hidden": (lambda: changed(hide), r"object \(0\) in 21%, index \(2\) in 100%"),
+    "other size": (lambda: places(tip_size=30.0), r"sticker 2 \(index\) .*15 mm .*24 mm"),
+    "other time": (lambda: changed(show_another_time), "its motion is not that of"),
+    "nothing moves": (lambda: places(slips=((0, 0),), elastic=0), NOT_ALIKE),
+    "lost pictures": (lambda: changed(lose_pictures), NOT_ALIKE),
 }
 
 
 @pytest.mark.parametrize(("made", "message"), BAD_FILMS.values(), ids=BAD_FILMS)
 def test_a_film_that_shows_no_slips_is_refused(film, made, message):
     film(*made())
-    with pytest.raises(RecordingError, match=message) as refused:
+    with pytest.raises(RecordingError, match=rf"run\.mp4.*{message}"):
         propose("tracking", recording(), video="run.mp4")
-    assert "\n" not in str(refused.value)
 
 
 @pytest.mark.parametrize("bodies", [{"object": 0}, {"index": 2}, {"object": 0, "toe": 3}])
 def test_stickers_of_other_bodies_are_refused(film, bodies):
     film(*places())
-    with pytest.raises(ValueError, match="object and at least one of thumb, index expected"):
+    with pytest.raises(ValueError, match="thumb, index"):
         propose("tracking", recording(), video="run.mp4", bodies=bodies)
 
 
 def test_the_size_of_a_sticker_is_above_zero():
-    with pytest.raises(ValueError, match="tip_size: a number above 0 expected, -1 given"):
+    with pytest.raises(ValueError, match="tip_size"):
         VideoRule(tip_size=-1)
 
 
@@ -249,25 +240,23 @@ def stamped(tmp_path, film, lines):
 
 def test_the_stamps_of_a_recorded_camera_count(film, tmp_path):
     labels = propose("tracking", recording(), video=stamped(tmp_path, film, "39.1"))
-    found = slips_of(labels["index"])
-    assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.03)
-    assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
+    assert offset_of(check_onsets(labels, 0.03)[0]) == pytest.approx(0, abs=0.008)
 
 
 def test_the_stamps_give_the_clock_where_motion_does_not(film, tmp_path, monkeypatch):
     path = stamped(tmp_path, film, "")
     monkeypatch.setattr(video_clock, "_coarse_offset", lambda *_: (9.0, 1.2))
     found = slips_of(propose("tracking", recording(), video=path)["index"])
-    assert float(found[0].evidence.split("later by ")[1].split()[0]) == pytest.approx(0, abs=0.008)
+    assert offset_of(found[0]) == pytest.approx(0, abs=0.008)
     (tmp_path / "run.times").unlink()
-    with pytest.raises(RecordingError, match="its motion is not that of recording"):
+    with pytest.raises(RecordingError, match="its motion"):
         propose("tracking", recording(), video=path)
 
 
 @pytest.mark.parametrize("lines", ["no time\n", "3.0\n", "nan\n", "40.0\n" + 20_000 * " "])
 def test_stamps_that_are_none(film, tmp_path, monkeypatch, lines):
     monkeypatch.setattr(stickers, "MAX_STAMPS", 40_000)
-    with pytest.raises(RecordingError, match=r"run\.times: a time in each line \[s\], each later"):
+    with pytest.raises(RecordingError, match=r"run\.times"):
         propose("tracking", recording(), video=stamped(tmp_path, film, lines))
 
 
@@ -279,17 +268,9 @@ def measured(names, scale=1e-3):
     turned = moved[:, 0] - moved[0, 0]
     half = turned / 10 / 2  # at a lever of 10 mm
     flip = np.where(np.arange(len(times)) % 7 < 3, -1, 1)
-    values = {
-        "time": times,
-        "x": away[:, 0],
-        "y": away[:, 1],
-        "z": 0 * times,
-        "stage": away[:, 0],
-        "qw": flip * np.cos(half),
-        "qx": 0 * times,
-        "qy": 0 * times,
-        "qz": flip * np.sin(half),
-    }
+    still = 0 * times
+    values = {"time": times, "x": away[:, 0], "y": away[:, 1], "z": still, "stage": away[:, 0]}
+    values |= {"qw": flip * np.cos(half), "qx": still, "qy": still, "qz": flip * np.sin(half)}
     rows = np.column_stack([values[name] for name in names])
     return "\n".join([",".join(names), *(",".join(f"{x:.9f}" for x in row) for row in rows)])
 
@@ -310,31 +291,20 @@ def test_other_instruments_give_the_same_onsets(tmp_path, names, column):
     labels = propose("tracking", recording(), motion=path, column=column)
     assert list(labels) == ["thumb", "index"]  # the object moves against the whole hand
     for finger in labels:
-        found = slips_of(labels[finger])
-        assert [label.start for label in found] == pytest.approx([s for s, _ in SLIPS], abs=0.03)
+        found = check_onsets(labels, 0.03, finger)
         sizes = [float(label.evidence.split()[1]) for label in found]
         assert sizes == pytest.approx([size for _, size in SLIPS], abs=0.15)
-        assert "motion stage.csv, later by 0.23" in found[0].evidence
+        assert offset_of(found[0]) == pytest.approx(SHIFT, abs=0.01)
 
 
+TURNS = "time,qw,qx,qy,qz\n" + "".join(f"{k},3,0,0,0\n" for k in range(200))
+REST = "time,a\n" + "".join(f"{k / 50},0\n" for k in range(1000))
 BAD_MOTIONS = {
-    "no motion": ("time,a\n" + "1,2\n" * 200, None, r"has the columns time, a; time and x,y,z or "),
-    "no such column": (
-        "time,a\n" + "1,2\n" * 200,
-        "b",
-        "column 'b' is missing; it has 'time', 'a'",
-    ),
-    "too short": ("time,a\n1,2\n", "a", r"stage\.csv has 1 times; at least 100 expected"),
-    "no turns": (
-        "time,qw,qx,qy,qz\n" + "".join(f"{k},3,0,0,0\n" for k in range(200)),
-        None,
-        r"stage\.csv: unit quaternions qw,qx,qy,qz expected in each row",
-    ),
-    "at rest": (
-        "time,a\n" + "".join(f"{k / 50},0\n" for k in range(1000)),
-        "a",
-        "its motion is not that of recording 'pulls' at any offset",
-    ),
+    "no motion": ("time,a\n" + "1,2\n" * 200, None, "columns time, a; time and x,y,z"),
+    "no such column": ("time,a\n" + "1,2\n" * 200, "b", "'b'"),
+    "too short": ("time,a\n1,2\n", "a", "1 times"),
+    "no turns": (TURNS, None, "qw,qx,qy,qz"),
+    "at rest": (REST, "a", "its motion"),
 }
 
 
@@ -347,7 +317,7 @@ def test_motions_that_cannot_be_used(tmp_path, text, column, message):
 
 
 def test_something_must_be_measured():
-    with pytest.raises(ValueError, match="neither a video nor a motion given"):
+    with pytest.raises(ValueError, match="video"):
         video.propose(recording())
 
 
@@ -364,10 +334,7 @@ def test_a_flash_gives_the_offset_of_clocks(film, monkeypatch):
     markers = [(t + SHIFT + 0.02, "flash") for t in (1.2, 30.5)]
     marked = replace(pulls, markers=tuple(markers))
     monkeypatch.setattr(video_clock, "_coarse_offset", None)  # it is not searched
-    labels = propose("tracking", marked, video="run.mp4")
-    assert [label.start for label in slips_of(labels["index"])] == pytest.approx(
-        [s for s, _ in SLIPS], abs=0.02
-    )
+    check_onsets(propose("tracking", marked, video="run.mp4"), 0.02)
 
 
 @pytest.mark.parametrize("levels", [np.zeros(0), np.full(50, 90.0)])

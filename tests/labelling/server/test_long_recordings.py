@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
-from holdfast.errors import RecordingError
 from holdfast.features.force import tared_force
-from holdfast.io import load_recording, parquet, save_recording
+from holdfast.io import load_recording, save_recording
 from holdfast.labelling.server import long_recordings, workspace
 from holdfast.labelling.server.long_recordings import load_for_labelling, without_force
 from holdfast.labelling.server.signals import SERIES
@@ -111,18 +110,3 @@ def test_without_its_force_a_finger_needs_no_memory_for_it(path):
     assert empty.digest == recording.digest
     assert empty.modules["thumb"].readings.strides == (0, 0, 0)
     np.testing.assert_array_equal(empty.modules["thumb"].times, recording.modules["thumb"].times)
-
-
-def test_columns_are_the_readings_by_taxel_and_axis(path):
-    header, groups = parquet.read_columns(path)
-    parts = [part["/tactile/index"] for part in groups if "/tactile/index" in part]
-    columns = np.concatenate([values for _, values in parts], axis=1)
-    readings = load_recording(path).modules["index"].readings
-    assert header.digest == load_recording(path).digest
-    np.testing.assert_array_equal(columns.T.reshape(readings.shape), readings)
-
-
-def test_a_missing_file_and_another_format_are_refused_as_ever(tmp_path):
-    for name in ("none.parquet", "none.csv"):
-        with pytest.raises(RecordingError, match=f"{name} does not exist"):
-            load_for_labelling(tmp_path / name)

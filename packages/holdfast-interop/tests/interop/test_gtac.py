@@ -41,14 +41,14 @@ def test_numbered_columns_and_a_first_row_without_time(tmp_path):
 @pytest.mark.parametrize(
     ("stamps", "text"),
     [
-        ([0, "", 14], "a.csv, row 3: no time; only the first row may have none"),
-        ([0, 990, 5], "a.csv: times go back at sample 2: 0.005 s after 0.99 s"),
+        ([0, "", 14], r"a\.csv, row 3: no time"),
+        ([0, 990, 5], r"a\.csv: times go back at sample 2"),
     ],
 )
 def test_bad_times(tmp_path, stamps, text):
     names = ["", *map(str, range(49))]
     write(tmp_path / "a.csv", names, rows(3, milliseconds=stamps))
-    with pytest.raises(RecordingError, match=text.replace(".", r"\.")):
+    with pytest.raises(RecordingError, match=text):
         list(import_recordings(tmp_path / "a.csv", "gtac"))
 
 
@@ -83,9 +83,7 @@ def test_a_second_gripper_without_a_rate(tmp_path, rate):
     table = rows_of_gripper2(4)
     table[2][-2] = rate
     write(tmp_path / "a.csv", GRIPPER2, table)
-    with pytest.raises(
-        RecordingError, match=r"a\.csv, row 4, column 'Hz': \S+ given; a rate above"
-    ):
+    with pytest.raises(RecordingError, match=r"a\.csv, row 4, column 'Hz'"):
         list(import_recordings(tmp_path))
 
 
@@ -100,9 +98,7 @@ def test_the_real_recordings_of_the_second_gripper(data_folder):
 
 def test_other_columns(tmp_path):
     write(tmp_path / "a.csv", ["a", "b"], [[1, 2]])
-    with pytest.raises(
-        RecordingError, match=r"columns mag_x1,mag_y1,\.\.\.,mag_z15 expected, or a"
-    ):
+    with pytest.raises(RecordingError, match="mag_x1"):
         list(import_recordings(tmp_path / "a.csv", "gtac"))
 
 

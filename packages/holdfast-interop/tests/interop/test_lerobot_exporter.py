@@ -51,21 +51,14 @@ def column(table, name):
 
 
 def test_info_has_all_fields(info):
-    features = info.pop("features")
-    assert info == {
-        "codebase_version": "v3.0",
-        "robot_type": None,
-        "total_episodes": 2,
-        "total_frames": 692,
-        "total_tasks": 2,
-        "chunks_size": 1000,
-        "data_files_size_in_mb": 100,
-        "video_files_size_in_mb": 200,
-        "fps": 30,
-        "splits": {"train": "0:2"},
+    features = info["features"]
+    assert {name: value for name, value in info.items() if name != "features"} == {
+        "codebase_version": "v3.0", "robot_type": None, "total_episodes": 2, "total_frames": 692,
+        "total_tasks": 2, "chunks_size": 1000, "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200, "fps": 30, "splits": {"train": "0:2"},
         "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
         "video_path": None,
-    }
+    }  # fmt: skip
     one = {"shape": [1], "names": None}
     assert features["timestamp"] == {"dtype": "float32", **one}
     assert all(features[name] == {"dtype": "int64", **one} for name in COUNTERS)
@@ -73,7 +66,6 @@ def test_info_has_all_fields(info):
     assert features["observation.tactile.thumb"]["dtype"] == "float32"
     assert features["observation.tactile.index.time"]["shape"] == [5]
     assert not any("/" in name for name in features)
-    info["features"] = features
 
 
 def test_columns_have_the_types_and_shapes_of_the_features(info, table):
@@ -101,12 +93,9 @@ def test_counters_run_on_and_times_are_those_of_frames(table):
     assert (column(table, "task_index") == episodes).all()
 
 
-def test_an_episode_is_a_row_group(data_set):
+def test_an_episode_is_a_row_group_and_says_where_it_is(data_set):
     file = pq.ParquetFile(data_set / DATA)
     assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [346, 346]
-
-
-def test_episodes_say_where_they_are(data_set):
     rows = pq.read_table(data_set / EPISODES).to_pylist()
     plain = [{k: v for k, v in row.items() if not k.startswith("holdfast.")} for row in rows]
     places = {
@@ -201,30 +190,21 @@ def refusal(error, recordings, out, **options):
 
 
 def test_a_rate_is_a_whole_number_from_1(recordings, tmp_path):
-    assert "--fps: a whole number" in refusal(ValueError, recordings, tmp_path / "set", fps=0)
+    assert "--fps" in refusal(ValueError, recordings, tmp_path / "set", fps=0)
 
 
-def test_recordings_that_do_not_fit_together_are_named(recordings, tmp_path):
-    out = tmp_path / "set"
+def test_recordings_that_do_not_fit_are_named(recordings, tmp_path):
+    index = recordings[1].modules["index"]
     other = Tactile(flat_sensor("small", 2, 2, 0.004), [0.0, 0.1], np.zeros((2, 4, 3)))
-    message = refusal(RecordingError, [recordings[0], Recording("c", {"index": other})], out)
-    assert message.startswith("c: observation.tactile.index has float64 of shape (4, 3)")
-    newtons = replace(recordings[1].modules["index"], unit="N")
-    message = refusal(RecordingError, [recordings[0], Recording("c", {"index": newtons})], out)
-    assert message == ("c: index is in N, in the recordings before in count; export them apart")
-
-
-def test_two_modules_that_would_share_a_column_are_refused(recordings, tmp_path):
-    module = recordings[1].modules["index"]
-    clash = Recording("c", {"index/1": module, "index.1": module})
-    message = refusal(RecordingError, [clash], tmp_path / "set")
-    assert "two arrays would share the column 'observation.tactile.index.1'" in message
-
-
-def test_a_recording_of_gaps_is_refused(tmp_path):
-    module = Tactile(sensor("anyskin"), [0.0, 1e9], np.zeros((2, 5, 3)))
-    message = refusal(RecordingError, [Recording("c", {"index": module})], tmp_path / "set")
-    assert "c: 3e+10 frames at 30 Hz for 2 samples; it is mostly gaps" in message
+    gaps = Tactile(sensor("anyskin"), [0.0, 1e9], np.zeros((2, 5, 3)))
+    for modules, text in (
+        ({"index": other}, "c: observation.tactile.index"),
+        ({"index": replace(index, unit="N")}, "c: index is in N"),
+        ({"index/1": index, "index.1": index}, "'observation.tactile.index.1'"),
+        ({"skin": gaps}, "c: 3e+10 frames"),
+    ):
+        given = [recordings[0], Recording("c", modules)]
+        assert text in refusal(RecordingError, given, tmp_path / "set")
 
 
 def test_only_a_data_set_is_replaced(recordings, tmp_path):
@@ -235,19 +215,13 @@ def test_only_a_data_set_is_replaced(recordings, tmp_path):
     export(recordings[1:], out, fps=10, force=True)
     assert json.loads((out / "meta/info.json").read_text())["fps"] == 10
     assert [path.name for path in tmp_path.iterdir()] == ["set"]
-    (out / "data" / "video.mp4").write_text("of a camera")
-    with pytest.raises(OutputError, match="is not such an export"):
-        export(recordings[1:], out, force=True)
-    assert (out / "data" / "video.mp4").read_text() == "of a camera"
-    (tmp_path / "other" / "meta").mkdir(parents=True)
-    (tmp_path / "other" / "meta" / "info.json").write_text("{}")
-    with pytest.raises(OutputError, match="is not such an export"):
-        export(recordings[1:], tmp_path / "other", force=True)
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "thesis.txt").write_text("all of it")
-    with pytest.raises(OutputError, match="is not such an export"):
-        export(recordings[1:], tmp_path / "mine", force=True)
-    assert (tmp_path / "mine" / "thesis.txt").read_text() == "all of it"
+    for name in ("set/data/video.mp4", "other/meta/info.json", "mine/thesis.txt"):
+        file, folder = tmp_path / name, tmp_path / name.partition("/")[0]
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text("{}")
+        with pytest.raises(OutputError, match="is not such an export"):
+            export(recordings[1:], folder, force=True)
+        assert file.read_text() == "{}"
 
 
 def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
@@ -256,4 +230,4 @@ def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
 
     monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
     message = refusal(OutputError, recordings, tmp_path / "set")
-    assert message == f"cannot write {tmp_path / 'set'}: No space left on device"
+    assert "No space left on device" in message

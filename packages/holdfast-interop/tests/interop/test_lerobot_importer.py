@@ -42,16 +42,20 @@ def rewritten(path, change):
 
 
 @pytest.mark.parametrize("fps", [1, 30, 1000])
+@pytest.mark.parametrize("again", [False, True])
 def test_several_rates_labels_truth_markers_and_media_come_back(
-    make_recording, assert_same, tmp_path, fps
+    make_recording, assert_same, tmp_path, fps, again
 ):
-    recording = make_recording()
-    export([recording], tmp_path / "set", fps=fps)
-    (read,) = import_recordings(tmp_path / "set")
+    recording, folder = make_recording(), tmp_path / "set"
+    export([recording], folder, fps=fps)
+    if again:  # by another program
+        rewritten(folder / DATA, lambda table: table.select(sorted(table.column_names)))
+        rewritten(folder / EPISODES, lambda table: table)
+    (read,) = import_recordings(folder)
     assert_same(read, recording)
 
 
-@settings(max_examples=15, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data(), fps=st.sampled_from([1, 7]))
 def test_any_recording_comes_back(data, fps, recordings, assert_same, tmp_path_factory):
     recording = data.draw(recordings)
@@ -86,15 +90,6 @@ def test_a_gap_stays_a_gap(make_recording, assert_same, tmp_path):
     (read,) = import_recordings(tmp_path / "set")
     assert read.modules["thumb"].n_gaps == 1
     assert_same(read, with_gap)
-
-
-def test_a_data_set_that_another_program_wrote_again_comes_back(
-    data_set, make_recording, assert_same
-):
-    rewritten(data_set / DATA, lambda table: table.select(sorted(table.column_names)))
-    rewritten(data_set / EPISODES, lambda table: table)
-    (read,) = import_recordings(data_set)
-    assert_same(read, make_recording())
 
 
 def test_long_recordings_are_several_row_groups(make_recording, assert_same, tmp_path, monkeypatch):
@@ -161,11 +156,6 @@ def test_another_description_is_refused(data_set, field, value, message):
     assert message in refusal(data_set)
 
 
-def test_a_missing_file_is_named(data_set):
-    (data_set / DATA).unlink()
-    assert "cannot read" in refusal(data_set)
-
-
 def test_only_the_folder_of_a_data_set_is_recognised(data_set):
     assert lerobot.can_read(data_set)
     assert not lerobot.can_read(data_set / "data")
@@ -174,9 +164,9 @@ def test_only_the_folder_of_a_data_set_is_recognised(data_set):
 
 
 @pytest.mark.parametrize("part", ["meta/episodes", "data"])
-def test_a_pipe_in_a_data_set_is_refused_at_once(data_set, part):
+def test_a_file_that_is_missing_or_a_pipe_is_named(data_set, part):
     path = data_set / part / "chunk-000/file-000.parquet"
     path.unlink()
+    refusal(data_set)
     os.mkfifo(path)
-    with pytest.raises(RecordingError, match="it is a pipe or a device; a regular file expected"):
-        list(import_recordings(data_set, "lerobot"))
+    assert "a pipe" in refusal(data_set)

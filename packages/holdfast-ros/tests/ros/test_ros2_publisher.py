@@ -11,18 +11,8 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 from holdfast_ros.dds import Link
 from holdfast_ros.publisher import Ros2Publisher
 from live.estimates import UNITS, check_received, estimate
-from ros.domains import new_domain
 
 PEER = Path(__file__).with_name("ros2_peer.py")
-
-
-@pytest.fixture
-def domain(monkeypatch):
-    """A ROS domain of this test alone, on this machine only."""
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    number = new_domain()
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    return number
 
 
 def test_another_program_reads_what_is_published(domain):
@@ -63,5 +53,5 @@ def test_another_program_reads_what_is_published(domain):
 
 
 def test_domains():
-    with pytest.raises(ValueError, match="a ROS domain from 0 to 232 expected, '500' given"):
+    with pytest.raises(ValueError, match="'500'"):
         Link("500")

@@ -28,6 +28,4 @@ def test_estimates_that_ros_refuses_are_reported(capsys, monkeypatch, grasp):
     monkeypatch.setattr(verb_options.Ros2, "publisher", lambda *_: Refuser())
     words = ["serve", "builtin:twin", str(grasp), "--once", "--speed", "50", "--port", "0"]
     assert main([*words, "--ros2"]) == 0
-    assert capsys.readouterr().err.endswith(
-        "Refuser: 7 estimates were refused, 2 were dropped because it was too slow\n"
-    )
+    assert "Refuser: 7 estimates were refused, 2 were dropped" in capsys.readouterr().err

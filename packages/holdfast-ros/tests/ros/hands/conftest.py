@@ -5,25 +5,15 @@ import gc
 import pytest
 
 from holdfast_ros.hands import ros_hand
-from ros.domains import new_domain
 
 from .drivers import Ros2Driver
 
 
 @pytest.fixture
-def domain(monkeypatch):
-    """A ROS domain of this test alone, on this machine only."""
-    number = new_domain()
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    monkeypatch.setattr(ros_hand, "DISCOVERY_TIME", 0.05)
-    return number
-
-
-@pytest.fixture
-def driver(domain):
+def driver(domain, monkeypatch):
     """A function that starts a driver."""
     gc.collect()  # participants that tests before left in cycles are still in the domain
+    monkeypatch.setattr(ros_hand, "DISCOVERY_TIME", 0.05)
     made = []
 
     def start(described, **changes):

@@ -32,19 +32,12 @@ def test_states_are_sorted_by_name():
 @pytest.mark.parametrize(
     ("states", "message"),
     [
-        (JointStates((), np.zeros(15), np.zeros(15)), r"no joint ah_joint00 \(there are no na"),
-        (
-            JointStates(("a", "b"), np.zeros(2), np.zeros(2)),
-            r"ah_joint00 \(there are a, b",
-        ),
-        (JointStates((), np.full(16, np.nan), np.zeros(16)), "a value is not finite"),
+        (JointStates((), np.zeros(15), np.zeros(15)), "no joint ah_joint00"),
+        (JointStates(("a", "b"), np.zeros(2), np.zeros(2)), r"there are a, b\)"),
+        (JointStates(ORDER.names, np.zeros(3), np.zeros(3)), "no joint ah_joint03"),
+        (JointStates((), np.full(16, np.nan), np.zeros(16)), "not finite"),
     ],
 )
 def test_states_of_another_hand_are_refused(states, message):
     with pytest.raises(ValueError, match=message):
         ORDER.sort(states)
-
-
-def test_a_short_list_of_names_is_no_crash():
-    with pytest.raises(ValueError, match="no joint"):
-        ORDER.sort(JointStates(ORDER.names, np.zeros(3), np.zeros(3)))

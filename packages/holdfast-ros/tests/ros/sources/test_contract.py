@@ -21,15 +21,12 @@ from holdfast.devices.sources import open_source
 from holdfast.io.cdr import MessageEncoder
 from holdfast_ros import dds
 from holdfast_ros.sensor_messages import known_definition
-from ros.domains import new_domain
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def ready(monkeypatch):
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    domain = new_domain()
+def ready(domain):
     definition = known_definition("xela_server_ros2/SensStream")
     node = dds.Node(domain)
     write, encode = node.writer("/xServTopic", definition), MessageEncoder(definition)

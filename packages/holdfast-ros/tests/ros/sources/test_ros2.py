@@ -13,27 +13,16 @@ pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
 from holdfast.devices.sources import open_source
-from holdfast.devices.uri import parse
 from holdfast.errors import SourceError
 from holdfast.io.definitions import parse_definition
 from holdfast.sensors import sensor
 from holdfast_ros import dds
 from holdfast_ros.sensor_messages import known_definition
 from holdfast_ros.sources import ros2
-from ros.domains import new_domain
 from ros_messages import PILLARS, sensor_state, store
 
 PEER = Path(__file__).parents[1] / "ros2_peer.py"
 N = 300
-
-
-@pytest.fixture
-def domain(monkeypatch):
-    """A domain of this test alone, on this machine alone."""
-    monkeypatch.setenv("ROS_LOCALHOST_ONLY", "1")
-    number = new_domain()
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
-    return number
 
 
 @contextmanager
@@ -74,31 +63,22 @@ def test_xela_from_another_process(domain):
     assert samples[-1].samples["thumb"].dtype == np.uint16
 
 
-def test_newtons_from_another_process(domain):
-    text = f"ros2:///xServTopic?values=calibrated&domain={domain}"
-    with publishing(domain, 60), open_source(text) as source:
-        assert source.sensors["finger1"].unit == "N"
-        (*_, arrival) = until(source, lambda a: a.samples)
-        assert arrival.samples["finger1"][0, 1:].tolist() == [1.0, 2.0]
-
-
 def test_a_publisher_is_replaced_by_another(domain):
     with publishing(domain, 20), open_source("ros2:///xServTopic") as source:
-        until(source, lambda a: "connection lost (the topic has no publisher)" in a.notices)
+        until(source, lambda a: any("connection lost" in text for text in a.notices))
         with publishing(domain, 2000):
             arrivals = until(source, lambda a: a.samples)
             notices = [notice for arrival in arrivals for notice in arrival.notices]
-            assert any(notice.startswith("connected again after ") for notice in notices)
+            assert any("connected again" in notice for notice in notices)
             assert arrivals[-1].n_lost == 0
 
 
 def test_pillars(domain):
     types = store("sensor_interfaces", PILLARS, ros2=True)
-    write = dds.Node(domain).writer(
-        "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState")
-    )
-    source = open_source("ros2:///hub_0/sensor_0?fingers=1:tip")
-    arrivals = fed(source, lambda k: write(pillars(types, k)))
+    topic, kind = "/hub_0/sensor_0", known_definition("sensor_interfaces/SensorState")
+    source = open_source(f"ros2://{topic}?fingers=1:tip")
+    with writing(domain, topic, kind, lambda k: pillars(types, k)), source:
+        arrivals = list(itertools.islice((a for a in source if a.samples), 10))
     assert source.sensors == {"tip": sensor("papillarray")}
     assert arrivals[-1].samples["tip"].shape == (9, 3)
     np.testing.assert_allclose(np.diff([a.time for a in arrivals]), 0.001)
@@ -111,57 +91,42 @@ def pillars(types, k):
     return bytes(types.serialize_cdr(message, message.__msgtype__))
 
 
-def fed(source, write):
-    """Ten arrivals of a source, while a thread writes."""
-    over = Event()
+@contextmanager
+def writing(domain, topic, kind, data):
+    """Write the data of message 0, 1, ... to a topic, in a thread."""
+    write, over = dds.Node(domain).writer(topic, kind), Event()
 
     def run():
         for k in itertools.count():
             if over.wait(0.01):
                 return
-            write(k)
+            write(data(k))
 
     thread = Thread(target=run)
     thread.start()
     try:
-        with source:
-            return list(itertools.islice((a for a in source if a.samples), 10))
+        yield
     finally:
         over.set()
         thread.join()
 
 
-def test_a_topic_without_publishers(domain, monkeypatch):
+def test_a_topic_that_cannot_be_read(domain, monkeypatch):
     monkeypatch.setattr(ros2, "TOPIC_OPEN_TIMEOUT", 1.0)
-    with pytest.raises(SourceError) as caught, open_source("ros2:///xServTopic"):
-        pass
-    assert str(caught.value) == (
-        f"no node publishes /xServTopic in ROS domain {domain}; published topics: none"
-    )
     keep = dds.Node(domain)
     write = keep.writer("/chatter", parse_definition("std_msgs/String", "string data"))
-    with pytest.raises(SourceError, match=r"published topics: /chatter \(std_msgs/String\)$"):
+    with pytest.raises(SourceError, match=rf"/xServTopic in ROS domain {domain}.*/chatter"):
         open_source("ros2:///xServTopic").open()
-    with pytest.raises(SourceError) as caught, open_source("ros2:///chatter"):
-        pass
-    assert str(caught.value) == (
-        "/chatter has messages of type std_msgs/String; supported types: "
-        "xela_server_ros2/SensStream, sensor_interfaces/SensorState"
-    )
-    del write
-
-
-def test_a_publisher_without_messages(domain, monkeypatch):
-    monkeypatch.setattr(ros2, "TOPIC_OPEN_TIMEOUT", 1.0)
-    node = dds.Node(domain)
-    write = node.writer("/xServTopic", known_definition("xela_server_ros2/SensStream"))
-    with pytest.raises(SourceError, match="/xServTopic has a publisher, but no samples came in"):
+    with pytest.raises(SourceError, match=r"/chatter .*std_msgs/String; supported types: xela_"):
+        open_source("ros2:///chatter").open()
+    silent = keep.writer("/xServTopic", known_definition("xela_server_ros2/SensStream"))
+    with pytest.raises(SourceError, match="/xServTopic has a publisher"):
         open_source("ros2:///xServTopic").open()
-    del write
+    del write, silent
 
 
 def test_a_configuration_of_dds_that_is_none(monkeypatch):
-    domain = 97  # DDS reads its configuration when the first node of the process joins a domain
+    domain = 231  # DDS reads its configuration when the first node of the process joins a domain
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain))
     monkeypatch.setenv("CYCLONEDDS_URI", "<CycloneDDS><Domain><Nonsense/></Domain></CycloneDDS>")
     with pytest.raises(SourceError, match=f"^ROS domain {domain} cannot be joined: "):
@@ -170,20 +135,24 @@ def test_a_configuration_of_dds_that_is_none(monkeypatch):
 
 @pytest.mark.parametrize("given", ["-1", "233", "zero"])
 def test_bad_domains(given, monkeypatch):
-    with pytest.raises(ValueError, match=f"a ROS domain from 0 to 232 expected, '{given}' given"):
+    with pytest.raises(ValueError, match=f"'{given}'"):
         open_source(f"ros2:///a?domain={given}")
     monkeypatch.setenv("ROS_DOMAIN_ID", given)
-    with pytest.raises(ValueError, match=f"'{given}' given"):
+    with pytest.raises(ValueError, match=f"'{given}'"):
         open_source("ros2:///a")
 
 
-def test_unknown_parameters():
-    with pytest.raises(
-        ValueError, match="unknown parameter master; there are domain, values, fing"
-    ):
-        open_source("ros2:///a?master=x")
-
-
-def test_the_path_is_the_topic():
-    scheme, address = parse("ros2:///xServTopic")
-    assert (scheme, address.host, address.path) == ("ros2", "", "/xServTopic")
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("ros2://host/xServTopic", "ros2:///TOPIC"),
+        ("ros2:///", "ros2:///TOPIC"),
+        ("ros2:///a?values=forces", "'forces'"),
+        ("ros2:///a?sensor=mine", "sensor=FILE.json"),
+        ("ros2:///a?fingers=thumb", "'thumb'"),
+        ("ros2:///a?master=x", "unknown parameter master"),
+    ],
+)
+def test_bad_addresses(text, message):
+    with pytest.raises(ValueError, match=message):
+        open_source(text)
