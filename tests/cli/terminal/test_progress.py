@@ -143,3 +143,12 @@ def test_each_number_of_clients_is_a_line(capsys):
         "waiting for a client on port 5000", "1 client", "2 clients",
         "waiting for a client on port 5000",
     ]  # fmt: skip
+
+
+def test_on_a_terminal_one_line_of_clients_is_rewritten(capsys, monkeypatch):
+    on_terminal(monkeypatch)
+    monkeypatch.setattr(module, "PLAY_REFRESH_INTERVAL", 0.0)
+    module.show_clients(PlayedServer(0, 1))
+    waiting, one = capsys.readouterr().err.split("\r")[1:]
+    assert "waiting for a client on port 5000" in waiting
+    assert one.startswith("1 client, 0.0 packets/s")
