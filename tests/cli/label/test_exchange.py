@@ -9,8 +9,6 @@ def test_labels_go_to_csv_and_back(capsys, folder):
     out = folder.parent / "csv"
     run_json(capsys, "export", "csv", out, folder)
     assert sorted(path.name for path in out.iterdir()) == ["one.labels.csv", "two.labels.csv"]
-    line = refusal(capsys, "import", out / "one.labels.csv", folder)
-    assert line.endswith("one.labels.csv has the labels of one recording; 2 recordings given")
     run_json(capsys, "import", out / "one.labels.csv", folder / "one.parquet", "--dry-run")
     assert not labels_path(folder / "one.parquet").exists()
     run_json(capsys, "import", out, folder)
@@ -20,8 +18,7 @@ def test_labels_go_to_csv_and_back(capsys, folder):
         (x.start, x.end, x.state) for x in inside
     ]
     save_manual_labels(folder / "two.mcap")
-    line = refusal(capsys, "import", out, folder, "--author", "bob")
-    assert "one.labels.json (and 1 more): labels of " in line
+    assert "(and 1 more)" in refusal(capsys, "import", out, folder, "--author", "bob")
 
 
 def test_a_recording_whose_name_is_a_path_is_exported_into_the_folder(capsys, folder):

@@ -1,15 +1,10 @@
 from pathlib import Path
 
+import pytest
+
 from holdfast.cli.label.inputs import RuleOptions
 
-from .helpers import refusal
-
-
-def test_a_folder_without_a_recording(capsys, tmp_path):
-    assert refusal(capsys, tmp_path).startswith(f"no recording in {tmp_path} (0 other entries)")
-    (tmp_path / "a.txt").write_text("a")
-    line = refusal(capsys, tmp_path / "a.txt")
-    assert line.startswith(f"{tmp_path}/a.txt is not a recording: .parquet or .mcap expected")
+from .helpers import refusal, run_json
 
 
 def test_poses_of_a_bag(monkeypatch):
@@ -26,3 +21,19 @@ def test_poses_of_a_bag(monkeypatch):
     )
     assert options.arguments("tracking") == {"tare": "0.5", "speed": 0.01, "tracking": "poses"}
     assert given == [(Path("run.bag"), "/aruco/pose", {"thumb": "tip"})]
+
+
+@pytest.mark.parametrize("name", ["audit", "compare"])
+def test_a_folder_may_have_the_name_of_a_command_that_was_removed(
+    capsys, tmp_path, monkeypatch, name
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir()
+    assert refusal(capsys, name).startswith(f"no recording in {name} ")
+
+
+def test_a_sheet_of_markers(capsys, tmp_path):
+    pytest.importorskip("cv2")
+    sheet = tmp_path / "sheet.pdf"
+    assert run_json(capsys, "markers", sheet) == {"sheet": str(sheet)}
+    assert sheet.read_bytes().startswith(b"%PDF-1.4")
