@@ -86,10 +86,11 @@ def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
 def test_a_bar_shows_the_remaining_time(capsys, monkeypatch, clock):
     on_terminal(monkeypatch)
     with ProgressBar("working", 10) as bar:
+        bar.advance()
         clock(2.9)
         assert math.isnan(bar._expected_duration())
         clock(57.1)
-        bar.advance()
+        bar.advance(0.0)
         assert bar._expected_duration() == pytest.approx(600.0)
     assert "10%" in capsys.readouterr().err
 
