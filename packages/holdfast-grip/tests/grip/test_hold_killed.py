@@ -121,12 +121,3 @@ def test_the_watchdog_brings_the_hand_into_its_safe_state(tmp_path, grasp, step,
         check_recording(tmp_path / "held.mcap")
     if step == RECORDED:
         assert load_recording(tmp_path / "held.mcap").duration > 5.0
-
-
-def test_the_twin_is_killed_while_it_is_recorded(tmp_path):
-    pytest.importorskip("mujoco", reason="mujoco is not installed")
-    uri = "twin:?object=ball&case=1&profile=finger-vigorous"
-    killed(tmp_path, RECORDED, uri, "--hand", "twin:")
-    recording = load_recording(tmp_path / "held.mcap")
-    assert not recording.complete
-    assert recording.modules.keys() == {"thumb", "index", "middle", "ring"}
