@@ -9,12 +9,11 @@ import pytest
 
 from command_line import Verb
 from holdfast.devices import sources
-from holdfast.devices.sources import Arrival
-from holdfast.devices.sources.base import Source
+from holdfast.devices.sources.replay import ReplaySource
 from holdfast.io import load_recording, save_recording
 from holdfast.model import Model
 from holdfast.training import calibrate
-from training.build import PAD, handling_recording, normalised_model
+from training.build import handling_recording, normalised_model
 
 pytestmark = pytest.mark.slow
 
@@ -111,46 +110,18 @@ def test_info_shows_own_handling(capsys, folder, mine, tmp_path):
     assert run(capsys, "info", folder / "model.json")[0] == 0
 
 
-class Hand(Source):
-    """Source that sends a recording once."""
-
-    name = "xela://fake"
-    paced = False
-
-    def __init__(self, recording):
-        self.sensors = dict.fromkeys(recording.modules, PAD)
-        thumb, index = recording.modules.values()
-        self._arrivals = [
-            Arrival(float(time), {"thumb": one, "index": two}, received=float(time))
-            for time, one, two in zip(thumb.times, thumb.readings, index.readings, strict=True)
-        ]
-
-    def open(self):
-        pass
-
-    def close(self):
-        pass
-
-    def read(self, timeout):
-        return self._arrivals.pop(0) if self._arrivals else None
-
-    @property
-    def ended(self):
-        return not self._arrivals
-
-
 def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypatch):
-    hand = Hand(handling_recording(3, held=20.0))
+    save_recording(handling_recording(3, held=20.0), tmp_path / "hand.mcap")
+    hand = ReplaySource(tmp_path / "hand.mcap", speed=0)
     monkeypatch.setattr(sources, "open_source", lambda *_, **__: hand)
-    out = tmp_path / "live.json"
-    code, _, err = run(
-        capsys, "calibrate", folder / "model.json", "xela://auto", "-o", out, "--seconds", 12
-    )
+    words = (folder / "model.json", "xela://auto", "-o", tmp_path / "live.json", "--seconds", 12)
+    code, _, err = run(capsys, "calibrate", *words)
     assert code == 0, err
     assert "pad: 11 s of holding" in err
     assert "\nheld 9 of 30 s\n" in err
-    assert Model.load(out).fingers["*"].handling["pad"].seconds == pytest.approx(10.8, abs=0.5)
-    assert [path.name for path in tmp_path.iterdir()] == ["live.json"]
+    handling = Model.load(tmp_path / "live.json").fingers["*"].handling["pad"]
+    assert handling.seconds == pytest.approx(10.8, abs=0.5)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.mcap", "live.json"]
 
 
 @pytest.mark.parametrize("verb", ["detect", "evaluate", "tune"])

@@ -52,6 +52,8 @@ def test_info_shows_the_good_and_marks_the_bad(folder, capsys):
     assert {name for name, each in found.items() if "error" in each} == set(found) - {"good"}
     assert all(name in found[name]["error"] for name in found if name != "good")
     assert err.count("holdfast: ") == 5
+    assert main(["info", str(folder)]) == 2
+    assert capsys.readouterr().out.count(" unreadable\n") == 5
 
 
 def test_the_page_lists_the_good_and_marks_the_bad(folder):

@@ -140,19 +140,6 @@ def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, folder, tmp_
     assert json.loads(out)["verdict"] is None
 
 
-def test_the_tables_fit_with_long_names(capsys, tmp_path):
-    for k in range(2):
-        whole = synthetic_recording(f"grasp-{k}", k, FINGERS)
-        long = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in whole.modules.items()}
-        save_recording(replace(whole, modules=long), tmp_path / f"{whole.name}.parquet")
-    code, out, _ = run(capsys, "builtin:noise-floor", tmp_path)
-    lines = out.splitlines()
-    assert code == 0
-    assert max(map(len, lines)) <= 80
-    assert sum(line.startswith("thumb_of_the") for line in lines) == 2
-    assert sum(line.startswith("95 % intervals over 2 recordings: ") for line in lines) == 1
-
-
 def test_a_plot_is_overwritten_only_by_force(capsys, folder, tmp_path):
     plot = tmp_path / "plot.png"
     words = [folder / "model.json", folder / "new", "--plot", plot]

@@ -9,10 +9,7 @@ import urllib.request
 import pytest
 
 from command_line import Verb
-from holdfast.cli import main
 from holdfast.cli import serve as verb
-from holdfast.devices.sources import Source
-from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -120,30 +117,3 @@ def test_a_recording_ends_the_service_once(capsys, grasp):
     code, out, err = run(capsys, *words)
     assert (code, out) == (0, "")
     assert err.count("builtin:noise-floor has no slip rule") == 1
-
-
-class Slow(Source):
-    """Source that has no packet while it is opened, and then fails."""
-
-    name = "xela://127.0.0.1:1"
-
-    def open(self):
-        time.sleep(0.5)
-        raise SourceError("no packet came")
-
-    def read(self, timeout):
-        return None
-
-    def close(self):
-        pass
-
-
-@pytest.mark.parametrize("command", [("serve", MODEL), ("play",)])
-def test_what_it_waits_for_is_printed(capsys, monkeypatch, command):
-    monkeypatch.setattr("holdfast.devices.sources.open_source", lambda *_, **__: Slow())
-    assert main([*command, Slow.name, "--port", "0", "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    waits, last = err.splitlines()
-    assert Slow.name in waits
-    assert last == "holdfast: no packet came"

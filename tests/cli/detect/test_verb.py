@@ -151,17 +151,6 @@ class TestSummary:
         assert len(hand) == np.count_nonzero(np.diff(want.hand, prepend=0))
         assert document["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
 
-    def test_the_table_fits_with_long_names(self, capsys, save):
-        whole = synthetic_recording("a", 1, ("thumb", "index"))
-        long = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in whole.modules.items()}
-        path = save(
-            replace(whole, modules=long), "2025-11-22_grasp-of-the-red-carton_case2-01.mcap"
-        )
-        assert main(["detect", NOISE_FLOOR, str(path), "--summary"]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        assert max(map(len, lines)) <= 80
-        assert {"thumb_of_the_left_", "index_of_the_left_"} <= {line[:18] for line in lines}
-
     def test_options_change_the_debouncing_of_the_model(self, capsys, model, grasp, tmp_path):
         held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
         held.save(tmp_path / "held.json")

@@ -96,18 +96,6 @@ def test_a_module_without_samples(capsys, grasp, tmp_path):
     assert main(["info", str(tmp_path / "a.parquet"), "--plot", str(tmp_path / "a.svg")]) == 0
 
 
-def test_the_tables_fit_with_long_names(capsys, grasp, tmp_path):
-    name = "2025-11-22_grasp-of-the-red-carton_case2_repetition-01"
-    modules = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in grasp.modules.items()}
-    path = tmp_path / f"{name}.parquet"
-    save_recording(replace(grasp, modules=modules), path)
-    for given in (path, tmp_path):
-        assert main(["info", str(given)]) == 0
-        out = capsys.readouterr().out
-        assert max(map(len, out.splitlines())) <= 80
-        assert re.search(r" (150\.0|0\.00) ", out)
-
-
 def test_markers_since_1970_are_shown_since_the_first_sample(capsys, grasp, tmp_path):
     times = grasp.modules["thumb"].times + 1795364053.99
     modules = {name: Tactile(m.sensor, times, m.readings) for name, m in grasp.modules.items()}
@@ -149,18 +137,6 @@ class TestFolder:
         assert documents[1] == info_json(capsys, path)
         assert main(["info", str(path.parent)]) == 0
         assert re.search(r"^grasp +2 +\d+ +150\.0 .* ok$", capsys.readouterr().out, re.M)
-
-    def test_damaged_ones_are_named_and_the_rest_shown(self, capsys, path):
-        broken = path.with_name("broken.parquet")
-        broken.write_bytes(b"")
-        assert main(["info", str(path.parent), "--json"]) == 2
-        out, err = capsys.readouterr()
-        first, second = json.loads(out)["recordings"]
-        assert (first["name"], second["name"]) == ("broken", "grasp")
-        assert str(broken) in first["error"]
-        assert err == f"holdfast: {first['error']}\n"
-        assert main(["info", str(path.parent)]) == 2
-        assert re.search(r"^broken .* unreadable$", capsys.readouterr().out, re.M)
 
 
 def test_a_plot_is_overwritten_only_by_force(capsys, path):

@@ -47,30 +47,18 @@ def test_the_table_and_what_hides_labels(capsys, folder):
     assert all(0 <= float(row.split()[1]) < 30 for row in lines[-5:])  # the least certain
 
 
-class TestRecordingsThatBeginInContact:
-    @pytest.fixture
-    def held(self, folder):
-        path = folder / "two.mcap"
-        recording = replace(load_recording(path), metadata={"starts_loaded": True})
-        save_recording(recording, path, force=True)
-        return folder
-
-    def message(self, capsys, folder, *words):
-        code, _, err = run(capsys, "auto", "signal", folder, "--dry-run", *words)
-        assert code == 0
-        return "".join(line for line in err.splitlines() if "begin in contact" in line)
-
-    def test_the_first_sample_is_their_tare(self, capsys, held):
-        assert "1 of 2 recordings" in self.message(capsys, held)
-        (one, two) = run_json(capsys, "auto", "signal", held, "--dry-run")["recordings"]
-        assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
-        words = ("auto", "signal", held / "two.mcap", "--dry-run", "--tare", "first")
-        (first,) = run_json(capsys, *words)["recordings"]
-        assert first["labels"] == two["labels"]
-
-    def test_a_tare_that_contains_the_grip_is_reported(self, capsys, held):
-        assert "--tare first" in self.message(capsys, held, "--tare", "0.5")
-        assert not self.message(capsys, held, "--tare", "first")
+def test_recordings_that_begin_in_contact_have_their_first_sample_as_tare(capsys, folder):
+    path = folder / "two.mcap"
+    held = replace(load_recording(path), metadata={"starts_loaded": True})
+    save_recording(held, path, force=True)
+    words = ("auto", "signal", folder, "--dry-run")
+    code, out, err = run(capsys, *words, "--json")
+    assert (code, "1 of 2 recordings begin in contact" in err) == (0, True)
+    (one, two) = json.loads(out)["recordings"]
+    assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
+    (_, first) = run_json(capsys, *words, "--tare", "first")["recordings"]
+    assert first["labels"] == two["labels"]
+    assert "--tare first fits them" in run(capsys, *words, "--tare", "0.5")[2]
 
 
 def test_a_dry_run_writes_nothing(capsys, folder):
