@@ -82,13 +82,6 @@ def test_evaluate_takes_the_labels_of_a_column(folder, sensor, capsys):
     assert json.loads(one)["pooled"]["n"] == report["pooled"]["n"] / 2
 
 
-def test_evaluate_in_contact_has_no_tare(folder, sensor, capsys):
-    write_press(folder / "press.csv", labelled=True)
-    words = ("evaluate", "builtin:any", "press.csv", "--sensor", sensor, "--json")
-    plain, held = (run(capsys, *words, *more).out for more in ((), ("--in-contact",)))
-    assert json.loads(plain)["pooled"] != json.loads(held)["pooled"]
-
-
 def test_two_recordings_are_refused(folder, sensor, capsys):
     (folder / "in").mkdir()
     for name in ("a", "b"):

@@ -10,6 +10,7 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import serve as verb
+from holdfast.cli.options import ServerOptions
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -95,21 +96,16 @@ def test_the_token_is_needed(capsys, grasp, when_served):
     assert found[0]["type"] == "hello"
 
 
-def test_the_token_of_a_file_or_of_the_environment(
-    capsys, grasp, when_served, tmp_path, monkeypatch
-):
+def test_the_token_of_a_file_or_of_the_environment(tmp_path, monkeypatch):
     file = tmp_path / "token.txt"
     file.write_text("  from-a-file\nsecond line\n")
     monkeypatch.setenv("HOLDFAST_TOKEN", "from-the-environment")
-    for words, token in (
-        (("--token-file", file), "from-a-file"),
-        ((), "from-the-environment"),
-        (("--token", "from-the-option"), "from-the-option"),
+    for options, token in (
+        ({"token_file": file}, "from-a-file"),
+        ({}, "from-the-environment"),
+        ({"token": "from-the-option"}, "from-the-option"),
     ):
-        when_served(lambda url: None)
-        code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", *words)
-        assert code == 0
-        assert json.loads(out)["url"].endswith(f"?token={token}")
+        assert ServerOptions("127.0.0.1", 0, **options).find_token() == token
 
 
 def test_a_recording_ends_the_service_once(capsys, grasp):

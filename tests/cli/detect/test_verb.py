@@ -306,9 +306,7 @@ def test_another_rate_is_resampled_with_a_message(capsys, model, save):
     got, err = lines(capsys, model, slow)
     assert "75 Hz" in err and err.count("\n") == 1
     times = [line["time"] for line in got if line["finger"] == "thumb"]
-    assert np.diff(times) == pytest.approx(1 / 150)
-    want = detect(Model.load(model), load_recording(slow)).fingers["thumb"]
-    assert times == want.times.tolist()
+    assert times == detect(Model.load(model), load_recording(slow)).fingers["thumb"].times.tolist()
 
 
 def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
@@ -371,7 +369,7 @@ def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
     assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
 
 
-def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
+def test_a_person_reads_no_times_since_1970(capsys, save):
     whole = synthetic_recording("a", 1, ("thumb", "index"))
     modules = {
         name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
@@ -383,34 +381,6 @@ def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
     rows = capsys.readouterr().out.splitlines()
     start = next(k for k, row in enumerate(rows) if "1795364053.990 s" in row)
     assert 0 < float(rows[start + 2].split()[0]) < 12
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
-    out, err = capsys.readouterr()
-    assert "1795364053.990 s" in err
-    assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
-
-
-def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
-    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    update = StreamDetector.update
-
-    def late(detector, arrival, **options):
-        if arrival is not None:
-            arrival = arrival._replace(faults={"thumb": (Fault.LATE,)})
-        return update(detector, arrival, **options)
-
-    monkeypatch.setattr(StreamDetector, "update", late)
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    with (
-        open_source(str(grasp)) as source,
-        XelaServer(source, port=0, wait=True) as server,
-    ):
-        assert main(["detect", NOISE_FLOOR, server.uri, "--seconds", "2.5"]) == 0
-    out, err = capsys.readouterr()
-    assert err.count("thumb: samples arrive late") == 1
-    first = next(row.split() for row in out.splitlines()[1:] if " index " in row)
-    assert 0 <= float(first[0]) < 3  # times count from the first sample
-    assert "thumb" not in out  # it is UNKNOWN all the time
 
 
 def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
