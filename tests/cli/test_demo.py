@@ -98,18 +98,12 @@ def test_the_objects_are_not_those_of_the_training():
 def test_an_interrupt_leaves_no_process_and_no_warning(tmp_path):
     """While it replays: an interrupt could be lost while modules are imported."""
     program = "import sys; from holdfast.cli import main; sys.exit(main())"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program, "demo", str(tmp_path / "demo"), "--no-browser"],
-        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    try:
+    command = [sys.executable, "-c", program, "demo", str(tmp_path / "demo"), "--no-browser"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, start_new_session=True, **pipes) as process:
         assert any(" UNSTABLE " in line for line in process.stderr)
         os.killpg(process.pid, signal.SIGINT)
         _, rest = process.communicate(timeout=60)
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
     assert process.returncode == 130
     assert rest.splitlines()[-1] == "holdfast: interrupted"
     assert not re.search(r"Traceback|[Ww]arning|leaked", rest)

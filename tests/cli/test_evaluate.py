@@ -2,56 +2,39 @@ import json
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 import pytest
 
 from command_line import Verb
-from holdfast.io import load_dataset, load_recording, save_recording
+from holdfast.io import load_dataset, save_recording
 from holdfast.model import Model
-from holdfast.synthetic import synthetic_recording
-from holdfast.training import Setting, evaluate, train
+from holdfast.training import evaluate
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 from holdfast.twin.simulation import Grasp, simulate
 
 pytestmark = pytest.mark.slow
 
-FINGERS = ("thumb", "index")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Return a folder with a model trained on `seen`, and other recordings `new`."""
-    root = tmp_path_factory.mktemp("evaluate")
-    for place, seeds in (("seen", (0, 1)), ("new", (2, 3))):
-        (root / place).mkdir()
-        for seed in seeds:
-            recording = synthetic_recording(f"grasp-{seed}", seed, FINGERS)
-            save_recording(recording, root / place / f"grasp-{seed}.parquet")
-    train(load_dataset(root / "seen"), Setting(trials=0)).model.save(root / "model.json")
-    return root
-
 
 run = Verb("evaluate").run
 
 
-def test_json_has_the_fields_of_the_contract_with_the_figures_of_the_library(capsys, folder):
-    code, out, err = run(capsys, folder / "model.json", folder / "new", "--json")
+def test_json_has_the_fields_of_the_contract_with_the_figures_of_the_library(capsys, grasps):
+    code, out, err = run(capsys, grasps / "model.json", grasps / "new", "--json")
     assert (code, err) == (0, "")
     report = json.loads(out)
     assert {"fingers", "pooled", "recordings", "events", "trained_on"} <= set(report)
     assert report["trained_on"] == []
     assert [each["name"] for each in report["recordings"]] == ["grasp-2", "grasp-3"]
-    metrics = evaluate(Model.load(folder / "model.json"), load_dataset(folder / "new"))
+    metrics = evaluate(Model.load(grasps / "model.json"), load_dataset(grasps / "new"))
     assert report["pooled"]["confusion"] == metrics.pooled.confusion
     assert report["pooled"]["auc"] == metrics.pooled.auc
 
 
-def test_training_recordings_are_named_even_if_renamed(capsys, folder, tmp_path):
-    seen = load_dataset(folder / "seen")[1]
+def test_training_recordings_are_named_even_if_renamed(capsys, grasps, tmp_path):
+    seen = load_dataset(grasps / "seen")[1]
     save_recording(seen, tmp_path / "renamed.mcap")
-    save_recording(load_dataset(folder / "new")[0], tmp_path / "grasp-0.parquet")
-    code, out, err = run(capsys, folder / "model.json", tmp_path, "--json")
+    save_recording(load_dataset(grasps / "new")[0], tmp_path / "grasp-0.parquet")
+    code, out, err = run(capsys, grasps / "model.json", tmp_path, "--json")
     assert code == 0
     assert json.loads(out)["trained_on"] == [load_dataset(tmp_path)[1].name]
     assert "was trained on 1 of these 2 recordings" in err
@@ -71,37 +54,23 @@ def restamped(recording, name):
     return replace(recording, name=name, modules=modules)
 
 
-def test_a_copy_with_other_times_is_found(capsys, folder, tmp_path):
+def test_a_copy_with_other_times_is_found(capsys, grasps, tmp_path):
     """A copy of a training recording is one; a copy of a new one counts once for the verdict."""
-    save_recording(restamped(load_dataset(folder / "seen")[0], "a"), tmp_path / "a.parquet")
-    new = load_dataset(folder / "new")[0]
+    save_recording(restamped(load_dataset(grasps / "seen")[0], "a"), tmp_path / "a.parquet")
+    new = load_dataset(grasps / "new")[0]
     save_recording(replace(new, name="b"), tmp_path / "b.parquet")
     save_recording(restamped(new, "c"), tmp_path / "c.parquet")
-    _, out, err = run(capsys, folder / "model.json", tmp_path, "--json")
+    _, out, err = run(capsys, grasps / "model.json", tmp_path, "--json")
     assert json.loads(out)["trained_on"] == ["a"]
     assert "c of b" in err.splitlines()[0]
-    _, alone, _ = run(capsys, folder / "model.json", tmp_path / "b.parquet", "--json")
+    _, alone, _ = run(capsys, grasps / "model.json", tmp_path / "b.parquet", "--json")
     verdict = json.loads(out)["verdict"].removeprefix(json.loads(alone)["verdict"])
     assert verdict.startswith(" From 1 of 3 recordings")
 
 
-def test_onsets_by_a_rule_are_scored_without_their_margin(folder, tmp_path):
-    whole = load_dataset(folder / "new")[0]
-    labels = {
-        name: [replace(label, author="rule:signal") for label in module.labels]
-        for name, module in whole.modules.items()
-    }
-    save_recording(whole.with_labels(labels), tmp_path / "rule.parquet")
-    hand = evaluate(Model.load(folder / "model.json"), load_dataset(tmp_path)).events.hand
-    by_hand = evaluate(Model.load(folder / "model.json"), [whole]).events.hand
-    assert (hand.onsets, by_hand.onsets, hand.n_events) == ("rule", "labels", by_hand.n_events)
-    longer = 60 * (hand.stable_minutes - by_hand.stable_minutes)
-    assert longer == pytest.approx(0.1 * hand.n_events, abs=0.06)
-
-
-def test_the_tables_have_the_trivial_baseline(capsys, folder):
-    _, out, _ = run(capsys, folder / "model.json", folder / "new")
-    _, document, _ = run(capsys, folder / "model.json", folder / "new", "--json")
+def test_the_tables_have_the_trivial_baseline(capsys, grasps):
+    _, out, _ = run(capsys, grasps / "model.json", grasps / "new")
+    _, document, _ = run(capsys, grasps / "model.json", grasps / "new", "--json")
     rows = [line.split()[2:] for line in out.splitlines() if "always STABLE " in line]
     (tn, fp), (fn, tp) = json.loads(document)["pooled"]["confusion"]
     n, n_events = tn + fp + fn + tp, json.loads(document)["events"]["hand"]["n_events"]
@@ -110,39 +79,39 @@ def test_the_tables_have_the_trivial_baseline(capsys, folder):
     assert rows[-1] == [str(n_events), "100.0", "100.0", "100.0", "never", "never", "0.0"]
 
 
-def mixed(folder, place, *, labels=True):
+def mixed(grasps, place, *, labels=True):
     """A folder with a recording that the model was trained on, and one that is new."""
-    save_recording(load_dataset(folder / "seen")[0], place / "seen.parquet")
-    new = load_dataset(folder / "new")[0]
+    save_recording(load_dataset(grasps / "seen")[0], place / "seen.parquet")
+    new = load_dataset(grasps / "new")[0]
     save_recording(new if labels else new.with_labels({}), place / "new.parquet")
     return place
 
 
-def test_no_verdict_on_training_recordings(capsys, folder):
-    _, out, _ = run(capsys, folder / "model.json", folder / "seen", "--json")
+def test_no_verdict_on_training_recordings(capsys, grasps):
+    _, out, _ = run(capsys, grasps / "model.json", grasps / "seen", "--json")
     assert json.loads(out)["verdict"] is None
-    _, out, _ = run(capsys, folder / "model.json", folder / "seen")
+    _, out, _ = run(capsys, grasps / "model.json", grasps / "seen")
     assert out.startswith("No verdict: ")
 
 
-def test_the_verdict_is_from_unseen_recordings_only(capsys, folder, tmp_path):
-    model = folder / "model.json"
-    _, out, _ = run(capsys, model, mixed(folder, tmp_path), "--json")
+def test_the_verdict_is_from_unseen_recordings_only(capsys, grasps, tmp_path):
+    model = grasps / "model.json"
+    _, out, _ = run(capsys, model, mixed(grasps, tmp_path), "--json")
     _, alone, _ = run(capsys, model, tmp_path / "new.parquet", "--json")
     verdict = json.loads(out)["verdict"].removeprefix(json.loads(alone)["verdict"])
     assert verdict.startswith(" From 1 of 2 recordings")
     assert len(json.loads(out)["recordings"]) == 2
 
 
-def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, folder, tmp_path):
-    place = mixed(folder, tmp_path, labels=False)
-    _, out, _ = run(capsys, folder / "model.json", place, "--json")
+def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, grasps, tmp_path):
+    place = mixed(grasps, tmp_path, labels=False)
+    _, out, _ = run(capsys, grasps / "model.json", place, "--json")
     assert json.loads(out)["verdict"] is None
 
 
-def test_a_plot_is_overwritten_only_by_force(capsys, folder, tmp_path):
+def test_a_plot_is_overwritten_only_by_force(capsys, grasps, tmp_path):
     plot = tmp_path / "plot.png"
-    words = [folder / "model.json", folder / "new", "--plot", plot]
+    words = [grasps / "model.json", grasps / "new", "--plot", plot]
     assert run(capsys, *words)[::2] == (0, f"{plot} written\n")
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert list(tmp_path.iterdir()) == [plot]
@@ -171,15 +140,3 @@ def test_the_model_of_the_twin_fits_a_grasp_of_the_twin(capsys, twin_grasp):
     assert report["trained_on"] == []
     assert report["pooled"]["accuracy"] > 80
     assert report["pooled"]["auc"] > 0.9
-
-
-def test_a_truth_with_impacts_has_a_line_of_its_own(capsys, twin_grasp, tmp_path):
-    grasp = load_recording(twin_grasp)
-    truth, lock = grasp.truth, grasp.metadata["locked_at"]
-    kinds = np.where(np.abs(truth.times - lock - 0.2) < 0.02, "knock", "")
-    hit = replace(grasp, truth=replace(truth, hand={**truth.hand, "impact": kinds}))
-    save_recording(hit, tmp_path / "hit.parquet")
-    _, out, _ = run(capsys, "builtin:twin", tmp_path / "hit.parquet")
-    assert "Knocks, taps and bumps" in out
-    report = json.loads(run(capsys, "builtin:twin", tmp_path / "hit.parquet", "--json")[1])
-    assert report["slips"]["pooled"]["impacts"] == {"n": 4, "false_alarms_per_impact": 0.0}

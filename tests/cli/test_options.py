@@ -5,7 +5,6 @@ import pytest
 from typer.models import OptionInfo
 
 from holdfast.cli import app
-from holdfast.cli.options import DEFAULT_JOBS
 
 OTHER_MEANING = {
     "--false-alarms": "by labels of events, and of all alarms in handling without labels",
@@ -57,16 +56,6 @@ def test_flags_are_those_of_the_command_line():
         }
         flags = {flag for flag, _ in declarations(app.load_verb(name))}
         assert {*flags, "--help-all"} == {flag for flag in shown if flag.startswith("-")}, name
-
-
-def test_jobs_have_one_default_in_every_verb():
-    defaults = {
-        name: inspect.signature(app.spread_groups(app.load_verb(name))).parameters["jobs"].default
-        for name in (*app.VERBS, *app.SUB_VERBS)
-        if "--jobs" in {flag for flag, _ in declarations(app.load_verb(name))}
-    }
-    assert len(defaults) > 3
-    assert set(defaults.values()) == {DEFAULT_JOBS}
 
 
 @pytest.mark.parametrize(("words", "port"), [([], "8080"), (["--port", "9"], "9")])

@@ -7,33 +7,17 @@ from command_line import Verb
 from holdfast.features import parse_features
 from holdfast.io import save_recording
 from holdfast.model import Model
-from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
 from training.build import sliding_recording
 
 pytestmark = pytest.mark.slow
 
-FINGERS = ("thumb", "index")
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Recordings of two fingers, and a model of other ones."""
-    place = tmp_path_factory.mktemp("tune")
-    (place / "data").mkdir()
-    for k in range(2):
-        recording = synthetic_recording(f"grasp-{k}", k, FINGERS)
-        save_recording(recording, place / "data" / f"grasp-{k}.parquet")
-    others = [synthetic_recording(f"grasp-{k}", k, FINGERS) for k in (2, 3)]
-    train(others, Setting(trials=0)).model.save(place / "model.json")
-    return place
-
 
 run = Verb().run
 
 
-def tune(capsys, folder, out, *words):
-    return run(capsys, "tune", folder / "model.json", folder / "data", "-o", out, *words)
+def tune(capsys, folder, out, *words, data="data"):
+    return run(capsys, "tune", folder / "model.json", folder / data, "-o", out, *words)
 
 
 def check_table(printed):
@@ -44,9 +28,9 @@ def check_table(printed):
     return last
 
 
-def test_json_the_table_and_info(capsys, folder, tmp_path):
+def test_json_the_table_and_info(capsys, grasps, tmp_path):
     out = tmp_path / "tuned.json"
-    code, printed, err = tune(capsys, folder, out, "--false-alarms", 30, "--json")
+    code, printed, err = tune(capsys, grasps, out, "--false-alarms", 30, "--json", data="new")
     report = json.loads(printed)
     assert (code, err) == (0, "")
     assert set(report) == {
@@ -59,14 +43,13 @@ def test_json_the_table_and_info(capsys, folder, tmp_path):
     document = json.loads(run(capsys, "info", out, "--json")[1])
     for finger in document["fingers"].values():
         choice = finger["heads"]["stable"]["choice"]
-        assert choice["recordings"] == ["grasp-0", "grasp-1"]
-    assert document["training"]["recordings"] == ["grasp-2", "grasp-3"]
-    assert set(document["fingers"]) == set(FINGERS)
-    _, printed, _ = tune(capsys, folder, out, "--false-alarms", 30, "--force")
+        assert choice["recordings"] == ["grasp-2", "grasp-3"]
+    assert document["training"]["recordings"] == ["grasp-0", "grasp-1"]
+    _, printed, _ = tune(capsys, grasps, out, "--false-alarms", 30, "--force", data="new")
     assert check_table(printed).startswith(f"{out}: STABLE from ")
     # The verdict is in sample, also in that of `evaluate` on the same recordings.
     assert " (in sample): " in report["verdict"]
-    _, printed, _ = run(capsys, "evaluate", out, folder / "data", "--json")
+    _, printed, _ = run(capsys, "evaluate", out, grasps / "new", "--json")
     assert json.loads(printed)["verdict"] == report["verdict"]
 
 
@@ -121,7 +104,7 @@ def test_info_of_a_model_that_is_tuned_for_both(capsys, sliding, tmp_path):
         assert f" for {head}" in text[text.index("tuned on ") :]
 
 
-def test_evaluate_and_train_print_slips(capsys, sliding, folder, tmp_path):
+def test_evaluate_and_train_print_slips(capsys, sliding, grasps, tmp_path):
     _, printed, _ = run(capsys, "evaluate", sliding / "model.json", sliding / "data")
     lines = printed.splitlines()
     place = next(k for k, line in enumerate(lines) if line.startswith("slips of fingers"))
@@ -132,5 +115,5 @@ def test_evaluate_and_train_print_slips(capsys, sliding, folder, tmp_path):
     assert all(len(line) <= 80 for line in lines[:-1])
     words = ["-o", tmp_path / "m.json", "--trials", "0", "--shared"]
     assert "slips of fingers (by the truth)" in run(capsys, "train", sliding / "data", *words)[1]
-    _, printed, _ = run(capsys, "evaluate", folder / "model.json", folder / "data")
+    _, printed, _ = run(capsys, "evaluate", grasps / "model.json", grasps / "new")
     assert "slips of fingers: the model has no slip rule\n" in printed

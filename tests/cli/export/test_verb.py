@@ -3,8 +3,6 @@ import shutil
 import pytest
 
 from command_line import Verb
-from holdfast.io import save_recording
-from holdfast.synthetic import synthetic_recording
 
 pytestmark = pytest.mark.slow
 
@@ -12,9 +10,8 @@ VERB = Verb("export")
 
 
 @pytest.fixture
-def grasp(tmp_path):
-    save_recording(synthetic_recording("grasp", 0, ("thumb",)), tmp_path / "grasp.parquet")
-    return tmp_path / "grasp.parquet"
+def grasp(grasps):
+    return grasps / "new" / "grasp-2.parquet"
 
 
 def test_the_sizes_of_a_model_are_printed(capsys, tmp_path):
@@ -29,7 +26,7 @@ def test_the_sizes_of_a_model_are_printed(capsys, tmp_path):
 def test_json_has_the_sizes(capsys, grasp, tmp_path):
     words = ("builtin:any", tmp_path / "model.h", "--like", grasp, "--float")
     document = VERB.document(capsys, *words)
-    assert document["fingers"] == ["thumb"]
+    assert document["fingers"] == ["thumb", "index"]
     assert document["state_size"] > 10_000 and "track.time" in document["double_fields"]
     assert (document["code_size"] is None) == (shutil.which("cc") is None)
 
@@ -37,8 +34,8 @@ def test_json_has_the_sizes(capsys, grasp, tmp_path):
 def test_tables_say_what_they_leave_out_and_are_overwritten_by_force(capsys, grasp, tmp_path):
     out = tmp_path / "csv"
     out.mkdir()
-    (out / "grasp.csv").write_text("mine")
+    (out / "grasp-2.csv").write_text("mine")
     code, printed, err = VERB.run(capsys, grasp, out, "--format", "csv", "--force")
     assert (code, printed.split(":")[0]) == (0, str(out))
     assert err == "a CSV table has no metadata\n"
-    assert (out / "grasp.csv").read_text().startswith("# sensor")
+    assert (out / "grasp-2.csv").read_text().startswith("# sensor")
