@@ -14,11 +14,9 @@ from command_line import Verb
 from holdfast.cli.options import awaited
 from holdfast.cli.terminal import progress
 from holdfast.contact import Fault
-from holdfast.detector import Detector, detect
 from holdfast.devices.sources import open_source
 from holdfast.errors import SourceError
 from holdfast.io import save_recording
-from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -77,8 +75,8 @@ play = Verb("play").run
 @pytest.mark.parametrize(
     "options", [("--version", "1.7", "--separate"), ("--whole-hand",)], ids=" ".join
 )
-def test_a_client_decides_as_on_the_recording(capsys, path, recording, options, monkeypatch):
-    """Compare sample by sample, over a socket, at eight times real time."""
+def test_a_client_gets_the_recording(capsys, path, recording, options, monkeypatch):
+    """Sample by sample, over a socket, at eight times real time."""
     monkeypatch.setattr(
         "holdfast.devices.sources.timeline.MAX_FAULTY_PACE", 1.0
     )  # a busy machine is slow
@@ -97,21 +95,10 @@ def test_a_client_decides_as_on_the_recording(capsys, path, recording, options, 
     assert len(arrivals) == n
     assert not any(a.n_lost or a.n_refused for a in arrivals)
     assert not any(Fault.CLOCK_JUMP in f for a in arrivals for f in a.faults.values())
-    model = Model.load("builtin:noise-floor")
-    detector = Detector.for_recording(model, recording)
-    offline = detect(model, recording)
-    for k, arrival in enumerate(arrivals):
-        samples = {name: arrival.samples[name] for name in recording.modules}
-        live = detector.update(samples, arrival.time)
-        for name, trace in offline.fingers.items():
-            expected = trace.estimate(k)
-            one = live.fingers[name]
-            for field in ("state", "reason", "faults"):
-                assert getattr(one, field) == getattr(expected, field)
-            np.testing.assert_array_equal(one.force, expected.force)
-            np.testing.assert_array_equal(one.instability, expected.instability)
-            np.testing.assert_array_equal(one.stable_probability, expected.stable_probability)
-    assert {state for trace in offline.fingers.values() for state in trace.state} >= {2, 3}
+    for name, module in recording.modules.items():
+        np.testing.assert_array_equal([a.samples[name] for a in arrivals], module.readings)
+    paces = np.diff([a.time for a in arrivals])
+    np.testing.assert_allclose(paces, np.diff(recording.modules["thumb"].times), atol=1e-3)
 
 
 def test_json_has_the_address_and_the_number_of_packets(capsys, path, monkeypatch):

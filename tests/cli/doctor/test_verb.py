@@ -56,13 +56,9 @@ def test_missing_packages_are_reported(capsys, monkeypatch):
         return known(package)
 
     monkeypatch.setattr(metadata, "version", version)
-    found = report(capsys)
-    assert found["packages"]["numpy"] is None
-    assert found["extras"]["hdf5"]["installed"] is False
+    assert report(capsys)["extras"]["hdf5"]["installed"] is False
     assert main(["doctor"]) == 0
-    out = capsys.readouterr().out
-    assert "MISSING" in out
-    assert install_command("hdf5") in out
+    assert install_command("hdf5") in capsys.readouterr().out
 
 
 def test_broken_kernels_are_reported_with_exit_code_0(capsys, monkeypatch):

@@ -189,15 +189,6 @@ MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, fri
  texture = [10e-6, 1.5e-3], finger_height = 0.024, yaw = 0.0}""".replace("\n", "")
 
 
-def test_an_own_object(tmp_path):
-    from holdfast.twin_recordings import plan_grasps
-
-    table = tmp_path / "mine.toml"
-    table.write_text(MUG)
-    (grasp,) = plan_grasps("", "1", 1, "reference", 0, table=table)
-    assert (grasp.name, grasp.item.mass) == ("mug-case1-1", 0.2)
-
-
 def test_an_object_whose_name_is_a_path_stays_in_the_folder(capsys, tmp_path):
     table = tmp_path / "mine.toml"
     table.write_text(MUG.replace("mug", '"../../mug"', 1))

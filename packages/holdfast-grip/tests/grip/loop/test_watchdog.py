@@ -182,17 +182,6 @@ class TestInOneProcess:
                 raise failure
         assert any(one.release for one in commands(tmp_path / "hand")) is bool(failure)
 
-    def test_a_loop_that_was_taken_over_may_not_continue(self, tmp_path):
-        watchdog = Watchdog(f"log:{tmp_path / 'hand'}", "hold", timeout=0.05)
-        watchdog.start()
-        watchdog.beat(COMMAND)
-        wait_for(tmp_path / "hand", N_SAFE_COMMANDS)
-        with pytest.raises(HandError, match="has taken over or ended"):
-            for _ in range(10_000):
-                watchdog.beat(COMMAND)
-                time.sleep(0.01)
-        watchdog.kill()
-
     def test_a_hand_that_it_cannot_reach_is_an_error(self, tmp_path):
         watchdog = Watchdog(f"log:{tmp_path}/no/hand", "hold")
         with pytest.raises(HandError, match=r"cannot command log:.*: cannot write .*No such file"):
