@@ -80,6 +80,7 @@ MESSAGES = [
     ("import kept out --format bag", "'bag'", "csv"),
     ("import a.parquet out --suffix bag", "'bag'", "'mcap'"),
     ("import a.parquet kept", "kept", "a folder expected"),
+    ("import a.parquet kept/deeper", "kept/deeper"),
     ("import press.csv out", "press.csv", "finger1", "--sensor FILE.json"),
     ("import press.csv out --columns F", "--columns", "time=COLUMN"),
     ("import a.parquet out --jobs 0", "jobs", "0 given"),

@@ -20,7 +20,6 @@ from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
-from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import source_recording
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -32,12 +31,6 @@ import os, sys
 from holdfast.cli import main
 if sys.stdin.isatty():
     os.close(os.open(os.ttyname(0), os.O_RDWR))  # our terminal, we being in the foreground
-sys.exit(main())
-"""
-FULL = """
-import resource, sys
-from holdfast.cli import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 sys.exit(main())
 """
 
@@ -287,32 +280,6 @@ def test_lines_of_a_pipe_set_markers(grasp, tmp_path):
     assert process.returncode == 0
     texts = [text for _, text in load_recording(out).markers]
     assert texts == ["closing", "q", "\ufffd half a line"]
-
-
-def test_on_a_full_disk_the_recorded_part_stays(grasp, tmp_path):
-    out = tmp_path / "a.mcap"
-    words = [sys.executable, "-c", FULL, "record", str(grasp), str(out), "--speed", "0"]
-    done = subprocess.run(
-        words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[-1].endswith(f"holdfast info {out}")
-    recording, want = load_recording(out), load_recording(grasp)
-    n = recording.modules["thumb"].n_samples
-    assert 0 < n < want.modules["thumb"].n_samples
-    assert not recording.complete
-    np.testing.assert_array_equal(
-        recording.modules["thumb"].readings, want.modules["thumb"].readings[:n]
-    )
-
-
-@pytest.mark.parametrize("words", [(), ("--force",)])
-def test_a_file_that_another_program_writes_is_refused(capsys, grasp, tmp_path, words):
-    out = tmp_path / "a.mcap"
-    with RecordingWriter(out, {"thumb": sensor("anyskin")}) as writer:
-        writer.append("thumb", [0.0, 0.01], np.zeros((2, 5, 3)))
-        assert str(out) in refusal(capsys, grasp, out, "--speed", "0", *words)
-    assert load_recording(out).modules["thumb"].n_samples == 2
 
 
 def test_a_camera_is_recorded_beside_the_samples(grasp, tmp_path, capsys):

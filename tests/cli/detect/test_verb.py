@@ -203,15 +203,9 @@ class TestSlips:
         """Slips by finger: first sample, first sample after it or None, largest probability."""
         slips = {}
         for name, trace in detect(Model.load(sliding), load_recording(grasp)).fingers.items():
-            found = runs(trace.slip_probability >= 0.5)
-            slips[name] = [
-                (
-                    trace.times[start],
-                    trace.times[end] if end < len(trace) else None,
-                    trace.slip_probability[start:end].max(),
-                )
-                for start, end in found
-            ]
+            times, values = [*trace.times, None], trace.slip_probability
+            found = runs(values >= 0.5)
+            slips[name] = [(times[a], times[b], values[a:b].max()) for a, b in found]
         return slips
 
     def test_lines_have_the_probability_and_no_message(self, capsys, sliding, grasp):
@@ -239,9 +233,7 @@ class TestSlips:
         assert [slip["begin"] for slip in slips] == sorted(slip["begin"] for slip in slips)
         for finger, expected in want.items():
             got = [slip for slip in slips if slip["finger"] == finger]
-            assert [
-                (slip["begin"], slip["end"], slip["max_probability"]) for slip in got
-            ] == expected
+            assert [(x["begin"], x["end"], x["max_probability"]) for x in got] == expected
             assert len(got) > 5
         assert main(["detect", str(sliding), str(grasp), "--summary"]) == 0
         begin, end, probability = want["thumb"][0]

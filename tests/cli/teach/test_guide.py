@@ -5,9 +5,8 @@ from holdfast.cli.teach.guide import Guide, confirm_safety
 from holdfast.cli.teach.screen import TeachScreen
 from holdfast.cli.terminal.control import StopRequest
 from holdfast.devices.sources.replay import ReplaySource
-from holdfast.errors import OutputError, SourceError, TrainingError
+from holdfast.errors import SourceError, TrainingError
 from holdfast.io import load_recording, save_recording
-from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import Stage
 from holdfast.live.teaching.steps import Check, Step
@@ -132,28 +131,6 @@ def test_without_a_person_a_grasp_that_fails_is_repeated_once(lead):
 def test_a_source_that_ends_in_a_step_is_an_error(lead, grasp):
     with pytest.raises(SourceError, match=f"{grasp}.*0 of 2 grasps are in .* --resume$"):
         lead(goes_on, OPEN, HOLD, loop=False)
-
-
-def test_a_full_disk_is_an_error_and_loses_nothing(lead, monkeypatch, tmp_path):
-    append = RecordingWriter.append
-
-    def full(self, name, times, readings):
-        if full.is_full:
-            raise OutputError("cannot write: No space left on device")
-        append(self, name, times, readings)
-
-    full.is_full = False
-
-    def choose(protocol):
-        full.is_full |= protocol.step is HOLD and protocol.stage is Stage.ACT
-        return goes_on(protocol)
-
-    monkeypatch.setattr(RecordingWriter, "append", full)
-    with pytest.raises(OutputError, match="No space left on device; 1 of 2 grasps"):
-        lead(choose, OPEN, HOLD)
-    assert load_recording(tmp_path / "grasps" / "001-open.mcap").complete
-    monkeypatch.undo()
-    assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
 
 
 def test_keys_throw_a_slide_away(lead, monkeypatch, capsys):

@@ -9,7 +9,7 @@ import pytest
 from command_line import Verb
 from holdfast.classifiers import RECIPES
 from holdfast.cli import main
-from holdfast.io import labels_path, load_dataset, load_recording, save_labels, save_recording
+from holdfast.io import load_dataset, save_recording
 from holdfast.model import Debounce, Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
@@ -157,17 +157,6 @@ def test_hold_and_our_own_features(capsys, data, model):
     assert made.debounce == Debounce(0.0, 0.1, 0.2)  # the hysteresis by default
     assert made.fingers["thumb"].features == Model.load(TWIN).fingers["*"].stable.features
     assert made.fingers["index"].slip is None
-
-
-def test_labels_of_a_rule_that_hide_others_are_reported(capsys, data, model):
-    path = data / "grasp-0.parquet"
-    save_labels(load_recording(path), path, author="rule:signal")
-    try:
-        code, _, err = run(capsys, data, "-o", model, "--trials", 0)
-    finally:
-        labels_path(path).unlink()
-    assert code == 0
-    assert "1 of 2 recordings" in err
 
 
 def test_the_classifiers_are_listed(capsys):
