@@ -48,16 +48,6 @@ def test_every_flag_is_declared_once():
     assert twice == set(OTHER_MEANING)
 
 
-def test_flags_are_those_of_the_command_line():
-    for name in (*app.VERBS, *app.SUB_VERBS):
-        command = app.get_command(app._app(name.split())).commands[name]
-        shown = {
-            flag for option in command.params for flag in (*option.opts, *option.secondary_opts)
-        }
-        flags = {flag for flag, _ in declarations(app.load_verb(name))}
-        assert {*flags, "--help-all"} == {flag for flag in shown if flag.startswith("-")}, name
-
-
 @pytest.mark.parametrize(("words", "port"), [([], "8080"), (["--port", "9"], "9")])
 def test_the_options_of_a_group_have_the_defaults_of_the_verb(words, port, monkeypatch):
     from holdfast.cli.serve import serve
