@@ -15,3 +15,20 @@ def terminal_width(monkeypatch):
 def no_progress_messages(monkeypatch):
     """Print no line of progress on stderr, even where a machine takes minutes."""
     monkeypatch.setattr(progress, "PROGRESS_INTERVAL", math.inf)
+
+
+@pytest.fixture(scope="session")
+def grasps(tmp_path_factory):
+    """A folder with a model that is trained on recordings in `seen`, and others in `new`."""
+    from holdfast.io import load_dataset, save_recording
+    from holdfast.synthetic import synthetic_recording
+    from holdfast.training import Setting, train
+
+    root = tmp_path_factory.mktemp("grasps")
+    for place, seeds in (("seen", (0, 1)), ("new", (2, 3))):
+        (root / place).mkdir()
+        for seed in seeds:
+            recording = synthetic_recording(f"grasp-{seed}", seed, ("thumb", "index"))
+            save_recording(recording, root / place / f"grasp-{seed}.parquet")
+    train(load_dataset(root / "seen"), Setting(trials=0)).model.save(root / "model.json")
+    return root

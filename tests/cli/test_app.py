@@ -10,19 +10,11 @@ from holdfast.errors import RecordingError
 from holdfast.removed import REMOVED
 
 
-def run(*words, **options):
-    return subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys; from holdfast.cli import main; sys.exit(main())",
-            *words,
-        ],
-        capture_output=True,
-        text=True,
-        check=False,
-        **options,
-    )
+def run(*words, stdout=subprocess.PIPE, **options):
+    program = "import sys; from holdfast.cli import main; sys.exit(main())"
+    command = [sys.executable, "-c", program, *words]
+    options |= {"stdout": stdout, "stderr": subprocess.PIPE}
+    return subprocess.run(command, text=True, check=False, **options)
 
 
 @pytest.fixture
@@ -40,9 +32,7 @@ def failing(monkeypatch):
 
 def one_line(capsys):
     out, err = capsys.readouterr()
-    assert out == ""
-    assert err.endswith("\n")
-    assert err.count("\n") == 1
+    assert (out, err.count("\n")) == ("", 1)
     return err.rstrip("\n")
 
 
@@ -67,15 +57,12 @@ def test_the_help_of_a_verb_lists_its_commands(capsys):
     out = capsys.readouterr().out
     for name, line in app.SUB_VERBS.items():
         assert f"\n  {name.split()[1]:9}{line}\n" in out
-    assert main(["label", "auto", "--fast"]) == 2
-    assert "(see holdfast label auto --help)" in capsys.readouterr().err
 
 
 def test_without_words_the_help_is_shown(capsys):
     assert main([]) == 0
     out = capsys.readouterr().out
-    assert out.index("holdfast demo") < out.index("Your hand and your recordings:")
-    assert "docs/" in out.rstrip().splitlines()[-1]
+    assert "holdfast demo" in out
     assert all(len(line) <= 80 for line in out.splitlines())
 
 
@@ -109,51 +96,23 @@ def test_help_names_every_verb_and_loads_nothing_heavy():
 
 
 @pytest.mark.parametrize(
-    ("words", "message"),
+    ("failure", "code", "message"),
     [
-        (["fly"], "holdfast: No such command 'fly'"),
-        (["--fast"], "holdfast: No such option: --fast"),
-        (["doctor", "--fast"], "holdfast: No such option: --fast"),
-        (["doctor", "now", "then"], "holdfast: Got unexpected extra argument"),
-        (["sensors", "--plot"], "holdfast: Option '--plot' requires an argument"),
+        (RecordingError("no\n samples"), 2, "no samples"),
+        (ValueError("13 given"), 2, "13 given"),
+        (TypeError("a path expected"), 2, "a path expected"),
+        (FileNotFoundError(2, "No such file", "a.mcap"), 2, "a.mcap: No such file"),
+        (OSError(28, "No space left on device"), 2, "[Errno 28] No space left on device"),
+        (MemoryError(), 2, "MemoryError"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyError("thumb"), 1, "internal error (KeyError: 'thumb'): please report it"),
     ],
 )
-def test_bad_usage_is_one_line(words, message, capsys):
-    assert main(words) == 2
-    assert one_line(capsys).startswith(message)
-
-
-@pytest.mark.parametrize(
-    ("failure", "message"),
-    [
-        (RecordingError("no\n samples"), "no samples"),
-        (ValueError("an even window expected, 13 given"), "an even window expected, 13 given"),
-        (TypeError("a path expected"), "a path expected"),
-        (
-            FileNotFoundError(2, "No such file or directory", "a.mcap"),
-            "a.mcap: No such file or directory",
-        ),
-        (OSError(28, "No space left on device"), "[Errno 28] No space left on device"),
-        (MemoryError(), "MemoryError"),
-    ],
-)
-def test_bad_input_is_one_line(failing, failure, message, capsys):
-    failing(failure)
-    assert main(["doctor"]) == 2
-    assert one_line(capsys) == f"holdfast: {message}"
-
-
-def test_interrupt(failing, capsys):
-    failing(KeyboardInterrupt())
-    assert main(["doctor"]) == 130
-    assert one_line(capsys) == "holdfast: interrupted"
-
-
-def test_a_bug_asks_to_be_reported(failing, capsys, monkeypatch):
+def test_a_failure_is_one_line(failing, failure, code, message, capsys, monkeypatch):
     monkeypatch.delenv("HOLDFAST_DEBUG", raising=False)
-    failing(KeyError("thumb"))
-    assert main(["doctor"]) == 1
-    assert one_line(capsys) == "holdfast: internal error (KeyError: 'thumb'): please report it"
+    failing(failure)
+    assert main(["doctor"]) == code
+    assert one_line(capsys) == f"holdfast: {message}"
 
 
 def test_a_traceback_only_with_holdfast_debug(failing, capsys, monkeypatch):
@@ -166,31 +125,18 @@ def test_a_traceback_only_with_holdfast_debug(failing, capsys, monkeypatch):
 def test_a_closed_pipe_is_no_failure():
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-c",
-            "import sys; from holdfast.cli import main; sys.exit(main())",
-            "sensors",
-        ],
-        stdout=writing,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    done = run("sensors", stdout=writing)
     os.close(writing)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_exit_code_reaches_the_shell():
     done = run("sensors", "nothing")
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
 
 
 @pytest.mark.parametrize("verb", ["detect", "serve", "record", "calibrate", "hold"])
-@pytest.mark.parametrize("words", [(), ("builtin:noise-floor", "none.mcap")])
+@pytest.mark.parametrize("words", [(), ("builtin:any", "none.mcap")])
 def test_settings_that_still_lie_here_are_named_once(verb, words, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     without = main([verb, *words]), *capsys.readouterr()
@@ -205,16 +151,13 @@ def test_settings_that_still_lie_here_are_named_once(verb, words, capsys, tmp_pa
 def test_verbs_that_did_not_read_the_settings_do_not_name_them(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "holdfast.toml").write_text("[")
-    for verb in ("sensors", "study"):
+    for verb in ("sensors", "datasets"):
         main([verb, "--json"])
         assert "holdfast.toml" not in capsys.readouterr().err
 
 
-def test_the_removed_source_hand_is_no_path(capsys, tmp_path, monkeypatch):
+def test_a_path_may_have_the_name_of_a_removed_source(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for words in (("detect", "builtin:any"), ("calibrate", "-o", "a.json", "builtin:any")):
-        assert main([*words, "hand"]) == 2
-        assert "the source hand was removed" in one_line(capsys)
     (tmp_path / "hand").mkdir()
     assert main(["detect", "builtin:any", "hand"]) == 2
     assert "removed" not in one_line(capsys)

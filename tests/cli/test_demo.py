@@ -40,7 +40,8 @@ run = Verb("demo").run
 
 
 def test_simulates_trains_and_replays(capsys, tmp_path):
-    code, out, err = run(capsys, tmp_path / "demo", "--speed", 0, "--json")
+    folder = tmp_path / "demo"
+    code, out, err = run(capsys, folder, "--speed", 0, "--json")
     assert code == 0
     result = json.loads(out)
     recordings = load_dataset(result["recordings"])
@@ -52,55 +53,19 @@ def test_simulates_trains_and_replays(capsys, tmp_path):
     assert result["shipped"]["model"] == verb.DEMO_MODEL
     assert result["shipped"]["metrics"]["events"]["hand"]["onsets"] == "truth"
     assert result["seconds"] > 0
-    for step in ("1/5", "2/5", "3/5", "4/5", "5/5  replaying mug-case2-1"):
-        assert step in err
-    assert "the authors of the recording label: slip at " in err
-    replayed = err[err.index("5/5") :].splitlines()[1:]
-    assert all(", hand " in line or " hand " in line for line in replayed)
-    assert all(len(line) <= 80 for line in replayed)
-
-
-def test_prints_next_steps_and_refuses_to_overwrite(capsys, tmp_path):
-    folder = tmp_path / "demo"
-    code, out, _ = run(capsys, folder, "--speed", 0)
-    assert code == 0
-    for line in (f"{folder}/recordings", "model.json", "Next:", "holdfast evaluate builtin:"):
-        assert line in out
-    # The verdicts stand last, and all of it fits a terminal.
-    lines = out.rstrip("\n").splitlines()
-    assert len(lines) < 24
-    assert out.index("Next:") < out.index("of objects that it was not trained on")
-    verdict = out[out.index("of objects that it was not trained on") :]
-    for figure in ("false alarms a minute", "missed", "a model of the paper's features"):
-        assert figure in verdict
-    shown = [line for line in lines if str(folder) not in line]
-    assert all(len(line) <= 80 for line in shown)
+    assert err.count("/5  ") == 5
+    assert all(len(line) <= 80 for line in err[err.index("5/5") :].splitlines()[1:])
     code, out, err = run(capsys, folder, "--speed", 0)
     assert (code, out, err.count("\n")) == (2, "", 1)
     assert "model.json exists already" in err
-    assert run(capsys, folder, "--speed", 0, "--seed", 1, "--force")[0] == 0
+    code, out, _ = run(capsys, folder, "--speed", 0, "--seed", 1, "--force")
+    assert code == 0
     assert {r.metadata["seed"] for r in load_dataset(folder / "recordings")} == {1}
-
-
-@pytest.mark.parametrize("speed", ["-1", "nan", "inf"])
-def test_bad_speed(capsys, tmp_path, speed):
-    code, out, err = run(capsys, tmp_path / "demo", f"--speed={speed}")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "--speed: at least 0 expected" in err
-    assert not (tmp_path / "demo").exists()
-
-
-def test_a_negative_seed(capsys, tmp_path):
-    code, out, err = run(capsys, tmp_path / "demo", "--seed", "-1")
-    assert (code, out, err.count("\n")) == (2, "", 1)
-
-
-def test_a_folder_that_cannot_be_made(capsys, tmp_path):
-    (tmp_path / "file").touch()
-    code, out, err = run(capsys, tmp_path / "file" / "demo")
-    assert (code, out) == (2, "")
-    assert err.startswith("holdfast: cannot write to ")
-    assert err.endswith("file/demo: Not a directory\n")
+    # The verdicts stand last, and all of it fits a terminal.
+    lines = out.rstrip("\n").splitlines()
+    assert len(lines) < 24
+    assert all(len(line) <= 80 for line in lines if str(folder) not in line)
+    assert f"{folder}/recordings" in out and "holdfast evaluate builtin:" in out
 
 
 def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, monkeypatch):
@@ -112,11 +77,7 @@ def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, mon
         return False
 
     monkeypatch.setattr("holdfast.web.server.open_browser", lambda url: _in_a_thread(look, url))
-    code, out, err = run(capsys, tmp_path / "demo", "--speed", 8, "--browser")
-    assert code == 0
-    assert "(open it in a browser)" in err
-    assert "it stops at the end of the recording" in err
-    assert "Next:" in out
+    assert run(capsys, tmp_path / "demo", "--speed", 8, "--browser")[0] == 0
     assert [set(page["fingers"]) for page in pages] == [{"thumb", "index", "middle", "ring"}]
 
 
@@ -137,18 +98,12 @@ def test_the_objects_are_not_those_of_the_training():
 def test_an_interrupt_leaves_no_process_and_no_warning(tmp_path):
     """While it replays: an interrupt could be lost while modules are imported."""
     program = "import sys; from holdfast.cli import main; sys.exit(main())"
-    process = subprocess.Popen(
-        [sys.executable, "-c", program, "demo", str(tmp_path / "demo"), "--no-browser"],
-        stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True, start_new_session=True,
-    )  # fmt: skip
-    try:
+    command = [sys.executable, "-c", program, "demo", str(tmp_path / "demo"), "--no-browser"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, start_new_session=True, **pipes) as process:
         assert any(" UNSTABLE " in line for line in process.stderr)
         os.killpg(process.pid, signal.SIGINT)
         _, rest = process.communicate(timeout=60)
-    finally:
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.communicate()
     assert process.returncode == 130
     assert rest.splitlines()[-1] == "holdfast: interrupted"
     assert not re.search(r"Traceback|[Ww]arning|leaked", rest)

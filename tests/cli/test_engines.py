@@ -1,12 +1,10 @@
 """The verbs that take `--engine` give the same files on a cluster, and refuse a wrong address."""
 
-import json
-
 import msgspec
 import pytest
 
+from command_line import Verb
 from holdfast import cluster as cluster_module
-from holdfast.cli import main
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -16,12 +14,6 @@ pytestmark = pytest.mark.slow
 
 SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
 HEADER = "# sensor: anyskin\ntime," + ",".join(f"t{n:02d}_{a}" for n in range(1, 6) for a in "xyz")
-VERBS = {
-    "simulate": ("twin",),
-    "import": ("in", "out"),
-    "train": ("data", "-o", "model.json"),
-    "evaluate": ("builtin:twin", "data"),
-}
 
 
 @pytest.fixture(scope="module")
@@ -50,36 +42,15 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def run(capsys, *words):
-    code = main(list(map(str, words)))
-    out, err = capsys.readouterr()
-    assert code == 0, err
-    return json.loads(out)
+run = Verb().document
 
 
 def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_no_scheduler_at_the_address(capsys, monkeypatch, folder, verb):
-    monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
-    before = sorted(folder.iterdir())
-    assert main([verb, *VERBS[verb], "--engine", "dask:tcp://127.0.0.1:1"]) == 2
-    out, err = capsys.readouterr()
-    assert (out, err.count("\n")) == ("", 1)
-    assert err.startswith("holdfast: no Dask scheduler answers at tcp://127.0.0.1:1: start one")
-    assert sorted(folder.iterdir()) == before
-
-
-@pytest.mark.parametrize("verb", VERBS)
-def test_unknown_engines(capsys, verb):
-    assert main([verb, *VERBS[verb], "--engine", "spark:x"]) == 2
-    assert "unknown engine 'spark:x'; there are loky and dask" in capsys.readouterr().err
-
-
 def test_simulate(capsys, cluster, folder):
-    words = ("--objects", "flask", "--cases", 1, "--repeats", 1, "--json")
+    words = ("--objects", "flask", "--cases", 1, "--repeats", 1)
     alone = run(capsys, "simulate", "alone", *words, "--jobs", 1)
     there = run(capsys, "simulate", "there", *words, "--engine", f"dask:{cluster}")
     assert there["recordings"] == alone["recordings"]
@@ -87,8 +58,8 @@ def test_simulate(capsys, cluster, folder):
 
 
 def test_import(capsys, cluster, folder):
-    alone = run(capsys, "import", "in", "alone", "--json")
-    there = run(capsys, "import", "in", "there", "--engine", f"dask:{cluster}", "--json")
+    alone = run(capsys, "import", "in", "alone")
+    there = run(capsys, "import", "in", "there", "--engine", f"dask:{cluster}")
     assert [each["name"] for each in there["recordings"]] == ["a", "b"]
     assert there["recordings"][0]["path"] == "there/a.parquet"
     assert there["n_samples"] == alone["n_samples"] == 80
@@ -96,26 +67,30 @@ def test_import(capsys, cluster, folder):
 
 
 def test_train_and_evaluate(capsys, cluster, folder):
-    words = ("train", "data", "--trials", 0, "--json")
+    words = ("train", "data", "--trials", 0)
     alone = run(capsys, *words, "-o", "alone.json")
     there = run(capsys, *words, "-o", "there.json", "--engine", f"dask:{cluster}")
     assert (folder / "there.json").read_bytes() == (folder / "alone.json").read_bytes()
     assert there["cross_validation"] == alone["cross_validation"]
     assert not (folder / "there.json.search").exists()
-    words = ("evaluate", "there.json", "data", "--json")
+    words = ("evaluate", "there.json", "data")
     assert run(capsys, *words, "--engine", f"dask:{cluster}") == run(capsys, *words)
 
 
 def test_a_search_on_a_cluster_is_not_resumed(capsys, cluster):
     words = ("train", "data", "-o", "model.json", "--resume", "--engine", f"dask:{cluster}")
-    assert main(list(words)) == 2
-    assert "--resume is for --engine loky" in capsys.readouterr().err
+    assert "--engine loky" in Verb().refusal(capsys, *words)
+
+
+def test_no_scheduler_at_the_address(capsys, monkeypatch, folder):
+    monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
+    words = ("train", "data", "-o", "model.json", "--engine", "dask:tcp://127.0.0.1:1")
+    assert "tcp://127.0.0.1:1" in Verb().refusal(capsys, *words)
+    assert not (folder / "model.json").exists()
 
 
 def test_a_folder_that_the_workers_do_not_share(capsys, cluster, monkeypatch):
-    monkeypatch.setattr(
-        "holdfast.twin_recordings.simulate_grasp", lambda grasp, out, force: [grasp.name]
-    )
+    name = "holdfast.twin_recordings.simulate_grasp"
+    monkeypatch.setattr(name, lambda grasp, out, force: [grasp.name])
     words = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--engine", f"dask:{cluster}")
-    assert main(["simulate", "there", *words]) == 2
-    assert "flask-case1-1.parquet, but it is not on this machine" in capsys.readouterr().err
+    assert "flask-case1-1.parquet" in Verb("simulate").refusal(capsys, "there", *words)

@@ -5,7 +5,6 @@ import pytest
 from typer.models import OptionInfo
 
 from holdfast.cli import app
-from holdfast.cli.options import DEFAULT_JOBS
 
 OTHER_MEANING = {
     "--false-alarms": "by labels of events, and of all alarms in handling without labels",
@@ -47,28 +46,6 @@ def test_every_flag_is_declared_once():
             declared[flag].add(id(option))
     twice = {flag for flag, options in declared.items() if len(options) > 1}
     assert twice == set(OTHER_MEANING)
-
-
-def test_flags_are_those_of_the_command_line():
-    for name in (*app.VERBS, *app.SUB_VERBS):
-        command = app.get_command(app._app(name.split())).commands[name]
-        shown = {
-            flag for option in command.params for flag in (*option.opts, *option.secondary_opts)
-        }
-        flags = {flag for flag, _ in declarations(app.load_verb(name))}
-        assert {*flags, "--help-all"} == {flag for flag in shown if flag.startswith("-")}, name
-
-
-def test_jobs_have_one_default_in_every_verb():
-    defaults = {
-        name: inspect.signature(app.spread_groups(app.load_verb(name))).parameters["jobs"].default
-        for name in (*app.VERBS, *app.SUB_VERBS)
-        if "--jobs" in {flag for flag, _ in declarations(app.load_verb(name))}
-    }
-    assert set(defaults) == {
-        "import", "train", "evaluate", "teach", "simulate", "trial", "study",
-    }  # fmt: skip
-    assert set(defaults.values()) == {DEFAULT_JOBS}
 
 
 @pytest.mark.parametrize(("words", "port"), [([], "8080"), (["--port", "9"], "9")])

@@ -9,7 +9,6 @@ import sys
 import termios
 import threading
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,7 +20,6 @@ from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
-from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import source_recording
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
@@ -33,12 +31,6 @@ import os, sys
 from holdfast.cli import main
 if sys.stdin.isatty():
     os.close(os.open(os.ttyname(0), os.O_RDWR))  # our terminal, we being in the foreground
-sys.exit(main())
-"""
-FULL = """
-import resource, sys
-from holdfast.cli import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, 60_000))
 sys.exit(main())
 """
 
@@ -97,14 +89,14 @@ def arrival(k, **fields):
     return Arrival(k / 100, {"thumb": values, "thumb/1": values}, k / 100, **fields)
 
 
-run = Verb("record").run
+VERB = Verb("record")
+run = VERB.run
 
 
 def refusal(capsys, *words):
     code, printed, err = run(capsys, *words)
     assert (code, printed) == (2, "")
-    *_, last = err.splitlines()
-    return last.removeprefix("holdfast: ")
+    return err.splitlines()[-1]
 
 
 def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
@@ -116,30 +108,21 @@ def test_records_a_recording_as_it_is(capsys, grasp, tmp_path):
     for name, module in want.modules.items():
         np.testing.assert_array_equal(copy.modules[name].times, module.times)
         np.testing.assert_array_equal(copy.modules[name].readings, module.readings)
-        assert copy.modules[name].readings.dtype == module.readings.dtype
-        assert copy.modules[name].sensor == module.sensor
     n = want.modules["thumb"].n_samples
-    assert re.fullmatch(
-        rf"{want.duration:.2f} s, {n} samples of 2 modules in {re.escape(str(out))} \(.* kB\)\n",
-        printed,
-    )
-    assert err.splitlines() == [
-        f"recording {grasp} to {out}",
-        "Ctrl-C stops",
-        f"next: holdfast info {out}",
-    ]
+    assert f"{n} samples of 2 modules in {out}" in printed
+    assert err.splitlines()[-1] == f"next: holdfast info {out}"
 
 
-def test_json_of_a_recording(capsys, device, tmp_path):
+def test_json_of_a_recording_in_a_folder(capsys, device, tmp_path):
     gap = {"thumb": (Fault.PACKET_GAP,)}
     came = [arrival(k) for k in range(50)]
     came += [arrival(k, faults=gap, n_lost=20, n_refused=1) for k in (70,)]
     came += [arrival(k) for k in range(71, 121)]
     device(*came, arrival(3))
-    out = tmp_path / "a.mcap"
-    code, printed, _ = run(capsys, "xela://fake", out, "--json")
-    assert code == 0
-    assert json.loads(printed) == {
+    document = VERB.document(capsys, "xela://fake", tmp_path / "a" / "b", "--object", "../a can/")
+    (out,) = (tmp_path / "a" / "b").iterdir()
+    assert re.fullmatch(r"a_can-\d{8}-\d{6}\.mcap", out.name)
+    assert document == {
         "path": str(out),
         "seconds": 1.2,
         "n_samples": {"thumb": 101, "thumb/1": 101},
@@ -155,12 +138,14 @@ def test_json_of_a_recording(capsys, device, tmp_path):
     }
 
 
-def test_metadata_of_the_options(capsys, device, tmp_path):
-    device(arrival(0))
+def test_metadata_of_the_options_and_only_fingers(capsys, device, tmp_path):
+    device(arrival(0), arrival(1))
     out = tmp_path / "a.mcap"
     words = ("--object", "can", "--case", "2", "--note", "wet", "--set", "operator=Ann=Bo")
-    run(capsys, "xela://fake", out, *words, "--set", "repeat=3", "--set", "object_mass=0.25")
-    metadata = dict(load_recording(out).metadata)
+    words += ("--set", "repeat=3", "--set", "object_mass=0.25", "--fingers-only")
+    run(capsys, "xela://fake", out, *words)
+    recording = load_recording(out)
+    metadata = dict(recording.metadata)
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", metadata.pop("recorded_at"))
     assert metadata == {
         "source": "xela://fake",
@@ -172,13 +157,10 @@ def test_metadata_of_the_options(capsys, device, tmp_path):
         "repeat": 3,
         "object_mass": 0.25,
     }
-
-
-def test_pads_can_be_left_out(capsys, device, tmp_path):
-    device(arrival(0), arrival(1))
-    run(capsys, "xela://fake", tmp_path / "a.mcap", "--fingers-only")
-    recording = load_recording(tmp_path / "a.mcap")
     assert {name: m.n_samples for name, m in recording.modules.items()} == {"thumb": 2}
+    device(arrival(0)).sensors = {"palm/1": ANYSKIN}
+    assert "palm/1" in refusal(capsys, "xela://fake", tmp_path / "b.mcap", "--fingers-only")
+    assert list(tmp_path.iterdir()) == [out]
 
 
 def test_it_stops_after_the_time(capsys, device, tmp_path):
@@ -198,90 +180,18 @@ def test_it_stops_although_the_source_is_silent(capsys, device, tmp_path, monkey
     assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 1)
 
 
-def test_without_samples_no_file_is_left(capsys, device, tmp_path):
-    out = tmp_path / "a.mcap"
-    device(notice_arrival(0.0, "hello"))
-    assert refusal(capsys, "xela://fake", out) == (
-        "xela://fake sent no samples: nothing was recorded"
-    )
-    device("away")
-    assert refusal(capsys, "xela://fake", out) == "xela://fake cannot be reached"
-    device("away")
-    assert refusal(capsys, "xela://fake", tmp_path / "new") == "xela://fake cannot be reached"
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_existing_files_are_kept_without_force(capsys, device, tmp_path):
+def test_a_file_is_replaced_only_by_samples_and_with_force(capsys, device, tmp_path):
     out = tmp_path / "a.mcap"
     out.write_text("mine")
-    device(arrival(0))
-    assert refusal(capsys, "xela://fake", out) == (
-        f"{out} exists already: choose another name, or give --force"
-    )
-    assert out.read_text() == "mine"
     device("away")
-    refusal(capsys, "xela://fake", out, "--force")
+    assert refusal(capsys, "xela://fake", out, "--force").endswith("cannot be reached")
     assert out.read_text() == "mine"
     device(arrival(0))
     assert run(capsys, "xela://fake", out, "--force")[0] == 0
     assert load_recording(out).complete
-
-
-def test_bad_arguments_are_refused(capsys, device, grasp, tmp_path):
-    device(arrival(0))
-    out = tmp_path / "a.mcap"
-    copy = tmp_path / "grasp.mcap"
-    save_recording(load_recording(grasp), copy)
-    for words, message in [
-        (("xela://fake", out, "--seconds", "0"), "--seconds: more than 0 s expected, 0 given"),
-        (("xela://fake", out, "--seconds", "nan"), "--seconds: more than 0 s expected, nan given"),
-        (("twin:", out, "--speed", "-1"), "--speed: at least 0 expected, -1 given"),
-        (
-            ("xela://fake", out, "--speed", "2"),
-            "--speed is for recordings and the twin; xela://fake is a device",
-        ),
-        (("xela://fake", out, "--set", "a"), "--set KEY=VALUE expected, 'a' given"),
-        (("xela://fake", out, "--set", "=a"), "--set KEY=VALUE expected, '=a' given"),
-        (
-            ("xela://fake", out, "--object", "can", "--set", "object=ball"),
-            "--set: object is given twice",
-        ),
-        (
-            ("xela://fake", tmp_path / "a.parquet"),
-            f"{tmp_path}/a.parquet: NAME.mcap expected "
-            "(holdfast import converts recordings to .parquet)",
-        ),
-        (
-            ("xela://fake", tmp_path / "no" / "a.mcap"),
-            f"cannot write {tmp_path}/no/a.mcap: the folder {tmp_path}/no does not exist",
-        ),
-        ((copy, copy, "--force"), f"{copy} is the source: choose another name"),
-        ((copy, tmp_path, "--force"), f"{copy} is the source: choose another name"),
-    ]:
-        assert refusal(capsys, *words) == message
-    assert list(tmp_path.iterdir()) == [copy]
-    made = device(arrival(0))
-    made.sensors = {"palm/1": ANYSKIN}
-    assert refusal(capsys, "xela://fake", out, "--fingers-only") == (
-        "no fingers to record: xela://fake has palm/1"
-    )
-
-
-@pytest.mark.parametrize(
-    ("source", "words", "pattern"),
-    [
-        ("xela://fake", (), r"xela-\d{8}-\d{6}\.mcap"),
-        ("xela://fake", ("--object", "../a can/"), r"a_can-\d{8}-\d{6}\.mcap"),
-        ("grasp.parquet", (), r"grasp\.mcap"),
-    ],
-)
-def test_in_a_folder_a_name_is_chosen(source, words, pattern, capsys, device, tmp_path):
-    device(arrival(0))
-    code, printed, _ = run(capsys, source, tmp_path / "new" / "folder", *words, "--json")
-    assert code == 0
-    path = Path(json.loads(printed)["path"])
-    assert [path] == list((tmp_path / "new" / "folder").iterdir())
-    assert re.fullmatch(pattern, path.name)
+    device(notice_arrival(0.0, "hello"))
+    assert "xela://fake" in refusal(capsys, "xela://fake", tmp_path / "b.mcap")
+    assert list(tmp_path.iterdir()) == [out]
 
 
 class Child:
@@ -341,25 +251,18 @@ def test_keys_set_markers_and_stop_and_the_terminal_is_restored(grasp, tmp_path)
     ]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_stops_it(number, grasp, tmp_path):
+@pytest.mark.parametrize("number", [None, signal.SIGTERM, signal.SIGHUP])
+def test_ctrl_c_or_a_signal_stops_it(number, grasp, tmp_path):
     out = tmp_path / "a.mcap"
     child = Child(grasp, out)
     child.wait_for(b" Hz")
-    os.kill(child.process.pid, number)
+    if number is None:
+        os.write(child.master, b"\x03")
+    else:
+        os.kill(child.process.pid, number)
     code, printed = child.finish()
-    assert code == 0
-    assert f" samples of 2 modules in {out}" in printed
-    assert f"next: holdfast info {out}" in child.output.decode().replace("\r\n", "\n")
+    assert (code, printed.count("\n")) == (0, 1)
     assert load_recording(out).complete
-
-
-def test_ctrl_c_on_the_terminal_stops_it(grasp, tmp_path):
-    child = Child(grasp, tmp_path / "a.mcap")
-    child.wait_for(b" Hz")
-    os.write(child.master, b"\x03")
-    assert child.finish()[0] == 0
-    assert load_recording(tmp_path / "a.mcap").complete
 
 
 def test_lines_of_a_pipe_set_markers(grasp, tmp_path):
@@ -379,36 +282,6 @@ def test_lines_of_a_pipe_set_markers(grasp, tmp_path):
     assert texts == ["closing", "q", "\ufffd half a line"]
 
 
-def test_on_a_full_disk_the_recorded_part_stays(grasp, tmp_path):
-    out = tmp_path / "a.mcap"
-    words = [sys.executable, "-c", FULL, "record", str(grasp), str(out), "--speed", "0"]
-    done = subprocess.run(
-        words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[-1] == (
-        f"holdfast: cannot write {out}: File too large; "
-        f"see the recorded part with: holdfast info {out}"
-    )
-    recording, want = load_recording(out), load_recording(grasp)
-    n = recording.modules["thumb"].n_samples
-    assert 0 < n < want.modules["thumb"].n_samples
-    assert not recording.complete
-    np.testing.assert_array_equal(
-        recording.modules["thumb"].readings, want.modules["thumb"].readings[:n]
-    )
-
-
-@pytest.mark.parametrize("words", [(), ("--force",)])
-def test_a_file_that_another_program_writes_is_refused(capsys, grasp, tmp_path, words):
-    out = tmp_path / "a.mcap"
-    with RecordingWriter(out, {"thumb": sensor("anyskin")}) as writer:
-        writer.append("thumb", [0.0, 0.01], np.zeros((2, 5, 3)))
-        text = refusal(capsys, grasp, out, "--speed", "0", *words)
-    assert text.startswith(f"{out} ")
-    assert load_recording(out).modules["thumb"].n_samples == 2
-
-
 def test_a_camera_is_recorded_beside_the_samples(grasp, tmp_path, capsys):
     cv2 = pytest.importorskip("cv2")
     film = tmp_path / "camera.avi"
@@ -418,22 +291,6 @@ def test_a_camera_is_recorded_beside_the_samples(grasp, tmp_path, capsys):
     writer.release()
     out = tmp_path / "run.mcap"
     assert run(capsys, grasp, out, "--camera", film, "--seconds", "2")[0] == 0
-    recording = load_recording(out)
     stamps = np.array((tmp_path / "run.times").read_text().split(), float)
-    # On the clock of the samples, which does not begin at 0, one picture each 20 ms.
-    assert len(stamps) > 10
-    assert recording.start - 0.1 < stamps[0] < stamps[-1] < recording.end + 0.2
-    assert [text for _, text in recording.markers if "camera" in text] == [
-        f"note: the camera ended after {len(stamps)} pictures"
-    ]
+    assert load_recording(out).start - 0.1 < stamps[0] < stamps[-1]  # the clock of the samples
     assert (tmp_path / "run.mp4").stat().st_size > 0
-
-
-def test_a_missing_camera_is_one_line_and_nothing_is_recorded(grasp, tmp_path, capsys):
-    pytest.importorskip("cv2")
-    words = (grasp, tmp_path / "a.mcap", "--camera", "none.mp4")
-    assert Verb("record").refusal(capsys, *words) == (
-        "no camera none.mp4: the number of a camera (0 is the first), or a video file or stream "
-        "expected"
-    )
-    assert not list(tmp_path.iterdir())

@@ -9,10 +9,8 @@ import urllib.request
 import pytest
 
 from command_line import Verb
-from holdfast.cli import main
 from holdfast.cli import serve as verb
-from holdfast.devices.sources import Source
-from holdfast.errors import SourceError
+from holdfast.cli.options import ServerOptions
 from holdfast.io import load_recording, save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -53,14 +51,6 @@ def when_served(monkeypatch):
 
 
 run = Verb("serve").run
-
-
-def refusal(capsys, *words):
-    code, out, err = run(capsys, *words)
-    *waits, last = err.splitlines()  # what it waits for, where that takes longer
-    assert all(text.startswith(("loading ", "simulating ")) for text in waits)
-    assert (code, out) == (2, "")
-    return last.removeprefix("holdfast: ")
 
 
 def ask(url, method="GET", **headers):
@@ -106,95 +96,20 @@ def test_the_token_is_needed(capsys, grasp, when_served):
     assert found[0]["type"] == "hello"
 
 
-def test_the_token_of_a_file_or_of_the_environment(
-    capsys, grasp, when_served, tmp_path, monkeypatch
-):
+def test_the_token_of_a_file_or_of_the_environment(tmp_path, monkeypatch):
     file = tmp_path / "token.txt"
     file.write_text("  from-a-file\nsecond line\n")
     monkeypatch.setenv("HOLDFAST_TOKEN", "from-the-environment")
-    for words, token in (
-        (("--token-file", file), "from-a-file"),
-        ((), "from-the-environment"),
-        (("--token", "from-the-option"), "from-the-option"),
+    for options, token in (
+        ({"token_file": file}, "from-a-file"),
+        ({}, "from-the-environment"),
+        ({"token": "from-the-option"}, "from-the-option"),
     ):
-        when_served(lambda url: None)
-        code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", *words)
-        assert code == 0
-        assert json.loads(out)["url"].endswith(f"?token={token}")
+        assert ServerOptions("127.0.0.1", 0, **options).find_token() == token
 
 
-def test_tokens_that_are_refused(capsys, grasp, tmp_path):
-    none, binary = tmp_path / "none", tmp_path / "binary"
-    binary.write_bytes(b"\xff\xfe\n")
-    for words, text in (
-        (("--token", "7 bytes"), "--token: at least 8 characters expected, 7 given"),
-        (("--token-file", none), f"--token-file {none}: a file expected, there is none"),
-        (("--token-file", tmp_path), f"--token-file {tmp_path}: a file expected, there is none"),
-        (("--token-file", binary), f"--token-file {binary}: text expected, other bytes given"),
-        (
-            ("--token-file", none, "--token", "x" * 9),
-            "--token and --token-file given; only one of them expected",
-        ),
-    ):
-        assert refusal(capsys, MODEL, grasp, *words) == text
-
-
-def test_a_model_without_a_slip_rule_is_reported_once(capsys, grasp):
-    words = ("builtin:noise-floor", grasp, "--once", "--speed", 20, "--port", 0, "--json")
+def test_a_recording_ends_the_service_once(capsys, grasp):
+    words = ("builtin:noise-floor", grasp, "--once", "--speed", 20, "--port", 0)
     code, out, err = run(capsys, *words)
-    assert code == 0
-    assert err.count("builtin:noise-floor has no slip rule: slip_probability is null") == 1
-    assert "slip rule" not in out
-
-
-def test_once_ends_with_the_recording(capsys, grasp):
-    code, out, err = run(capsys, MODEL, grasp, "--once", "--speed", 20, "--port", 0)
     assert (code, out) == (0, "")
-    assert "Ctrl-C stops it" in err
-
-
-def test_refusals(capsys, grasp, tmp_path):
-    assert refusal(capsys, MODEL, grasp, "--host", "0.0.0.0") == (
-        "--host 0.0.0.0 opens the service to the network: give --token SECRET as well "
-        "(or --token-file FILE, or HOLDFAST_TOKEN in the environment)"
-    )
-    assert refusal(capsys, MODEL, tmp_path / "none.parquet") == (
-        f"{tmp_path / 'none.parquet'} does not exist; a recording's file expected"
-    )
-    assert refusal(capsys, "builtin:best", grasp).startswith("unknown model 'builtin:best'")
-    assert refusal(capsys, MODEL, grasp, "--speed=-1") == "--speed: at least 0 expected, -1 given"
-    assert refusal(capsys, MODEL, "xela://127.0.0.1:1", "--speed", 2) == (
-        "--speed is for recordings and the twin; xela://127.0.0.1:1 is a device"
-    )
-    assert "port" in refusal(capsys, MODEL, grasp, "--port", 99999)
-    assert refusal(capsys, MODEL, grasp, "--ignore", "index").startswith("--ignore: FINGER:TAXEL")
-    for taxel in (0, 31):
-        assert refusal(capsys, MODEL, grasp, "--ignore", f"thumb:1,thumb:{taxel}") == (
-            f"thumb: taxel {taxel} to be ignored; it has the taxels 1 to 30"
-        )
-
-
-class Slow(Source):
-    """Source that has no packet while it is opened, and then fails."""
-
-    name = "xela://127.0.0.1:1"
-
-    def open(self):
-        time.sleep(0.5)
-        raise SourceError("no packet came")
-
-    def read(self, timeout):
-        return None
-
-    def close(self):
-        pass
-
-
-@pytest.mark.parametrize("command", [("serve", MODEL), ("play",)])
-def test_what_it_waits_for_is_printed(capsys, monkeypatch, command):
-    monkeypatch.setattr("holdfast.devices.sources.open_source", lambda *_, **__: Slow())
-    assert main([*command, Slow.name, "--port", "0", "--json"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "waiting for the first packet of xela://127.0.0.1:1" in err.splitlines()
-    assert err.splitlines()[-1] == "holdfast: no packet came"
+    assert err.count("builtin:noise-floor has no slip rule") == 1

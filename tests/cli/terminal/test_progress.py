@@ -71,15 +71,6 @@ def test_no_remaining_time_before_three_percent(capsys, clock):
     ]
 
 
-def test_no_remaining_time_before_three_seconds(clock):
-    bar = ProgressBar("reading", 10.0)
-    clock(2.9)
-    bar.advance(5.0)
-    assert math.isnan(bar._expected_duration())
-    clock(0.1)
-    assert bar._expected_duration() == pytest.approx(6.0)
-
-
 def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     on_terminal(monkeypatch)
     monkeypatch.setattr(module, "DISPLAY_DELAY", 0.01)
@@ -95,28 +86,18 @@ def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
 def test_a_bar_shows_the_remaining_time(capsys, monkeypatch, clock):
     on_terminal(monkeypatch)
     with ProgressBar("working", 10) as bar:
-        clock(60.0)
         bar.advance()
+        clock(2.9)
+        assert math.isnan(bar._expected_duration())
+        clock(57.1)
+        bar.advance(0.0)
         assert bar._expected_duration() == pytest.approx(600.0)
-    assert math.isnan(ProgressBar("working", 10)._expected_duration())
     assert "10%" in capsys.readouterr().err
 
 
-def test_progress_is_silent_without_a_terminal(capsys):
-    assert list(progress(range(3), "counting")) == [0, 1, 2]
-    assert capsys.readouterr() == ("", "")
-
-
-def test_progress_appears_on_a_terminal_after_a_while(capsys, monkeypatch):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    monkeypatch.setattr("holdfast.cli.terminal.progress.DISPLAY_DELAY", -1.0)
-    with ProgressBar("counting", 3) as bar:
-        bar.advance(3)
-    assert "counting" in capsys.readouterr().err
-
-
-def test_a_quick_task_shows_no_bar(capsys, monkeypatch):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_a_quick_task_shows_no_bar(is_terminal, capsys, monkeypatch):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal, raising=False)
     assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
     assert capsys.readouterr() == ("", "")
 
@@ -143,3 +124,12 @@ def test_each_number_of_clients_is_a_line(capsys):
         "waiting for a client on port 5000", "1 client", "2 clients",
         "waiting for a client on port 5000",
     ]  # fmt: skip
+
+
+def test_on_a_terminal_one_line_of_clients_is_rewritten(capsys, monkeypatch):
+    on_terminal(monkeypatch)
+    monkeypatch.setattr(module, "PLAY_REFRESH_INTERVAL", 0.0)
+    module.show_clients(PlayedServer(0, 1))
+    waiting, one = capsys.readouterr().err.split("\r")[1:]
+    assert "waiting for a client on port 5000" in waiting
+    assert one.startswith("1 client, 0.0 packets/s")

@@ -48,11 +48,6 @@ def words(status):
 
 
 def test_parts_of_the_status():
-    assert words(WELL) == "12.3 s   150.0 Hz   gaps 0   lost 0   2.5 MB   markers 2"
-    assert words(BAD) == (
-        "12.3 s   no samples   gaps 1   lost 3   dropped 4   2.5 MB   markers 2   "
-        "index late packet_gap"
-    )
     assert [text for text, bad in status_parts(WELL) if bad] == []
     assert [text for text, bad in status_parts(BAD) if bad] == [
         *("no samples", "gaps 1", "lost 3", "dropped 4", "index late packet_gap")

@@ -10,10 +10,10 @@ from grip.build import FINGERS, NORMAL, RATE, finger, hand, holding, run, scales
 from holdfast.contact import Cause, ContactEstimate, ContactState, HandEstimate, Reason
 from holdfast.sensors import flat_sensor, sensor
 from holdfast_grip import LAWS, GripController, GripReason, Limits, LoopState
-from holdfast_grip.command import event_texts
 from holdfast_grip.laws import Fixed
 
 SLIPPING = {name: {"probability": 0.05, "state": ContactState.UNSTABLE} for name in FINGERS}
+GONE = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
 RISING = {GripReason.UNSTABLE, GripReason.SLIP, GripReason.LOAD, GripReason.MARGIN}
 
 numbers = st.one_of(st.floats(-2.0, 2.0), st.floats(allow_nan=True, allow_infinity=True))
@@ -148,12 +148,9 @@ class TestStart:
 
     def test_a_finger_without_an_estimate_blocks_it(self):
         controller = GripController(Limits())
-        changes = {
-            "ring": {"state": ContactState.UNSTABLE, "normal": 30.0},
-            "index": {"state": ContactState.UNKNOWN},
-        }
+        unknown = {"index": {"state": ContactState.UNKNOWN}}
         for k in range(170):
-            controller.update(hand(k / RATE, ContactState.UNSTABLE, **changes), k / RATE)
+            controller.update(hand(k / RATE, ContactState.UNSTABLE, **unknown), k / RATE)
         assert controller.state is LoopState.IDLE
 
     def test_fingers_without_contact_are_not_loaded(self):
@@ -264,8 +261,7 @@ class TestFaults:
 
     def test_a_lost_object_is_a_fault_that_stays(self):
         controller, time = holding()
-        gone = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
-        commands, time = run(controller, time, 0.05, **gone)
+        commands, time = run(controller, time, 0.05, **GONE)
         assert (commands[-1].state, commands[-1].reason) == (LoopState.FAULT, GripReason.LOST)
         commands, _ = run(controller, time, 2.0)
         assert commands[-1].state is LoopState.FAULT
@@ -273,8 +269,7 @@ class TestFaults:
     def test_a_lasting_fault_replaces_one_that_ends_by_itself(self):
         controller, time = holding(recovery=0.5)
         assert controller.update(hand(time), time + 0.2).reason is GripReason.STALE
-        gone = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
-        commands, time = run(controller, time + 0.2, 0.1, **gone)
+        commands, time = run(controller, time + 0.2, 0.1, **GONE)
         assert commands[-1].reason is GripReason.LOST
         commands, _ = run(controller, time, 2.0)
         assert (commands[-1].state, commands[-1].reason) == (LoopState.FAULT, GripReason.LOST)
@@ -293,12 +288,6 @@ class TestFaults:
         controller.update(hand(time), time + 0.2)
         commands, _ = run(controller, time + 0.2, 0.3, **SLIPPING)
         assert all({one.scale for one in c.fingers.values()} == {1.0} for c in commands)
-
-    def test_faults_are_logged(self):
-        controller, time = holding()
-        controller.update(hand(time), time + 0.2)
-        texts = [text for _, text in event_texts(controller.events(), 4)]
-        assert texts == ["grip FAULT (stale)"]
 
     @pytest.mark.parametrize(
         ("moved", "state", "reason"),
@@ -319,8 +308,7 @@ class TestFaults:
         controller.events()
         if moved is not None:
             controller.observe(closed + moved)
-        gone = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
-        _, time = run(controller, time, 0.5, **gone)
+        _, time = run(controller, time, 0.5, **GONE)
         event = next(e for e in controller.events() if e.reason in (reason, GripReason.LOST))
         assert (event.state, event.reason, controller.state) == (state, reason, state)
         assert (controller.loaded_fingers == ()) is (state is LoopState.IDLE)
@@ -356,6 +344,10 @@ def lively(k, noise, **changes):
     return hand(k / RATE, **changes)
 
 
+def noisy(k):
+    return k * 37 % 11
+
+
 class TestFrozenReadings:
     """Forces that repeat exactly: the fault of a noisy sensor, the rest of a quiet one."""
 
@@ -375,7 +367,7 @@ class TestFrozenReadings:
 
     @pytest.mark.parametrize("on_fault", ["hold", "open"])
     def test_a_noisy_sensor_that_repeats_itself_is_a_fault_within_100_ms(self, on_fault):
-        controller, k = self.held(lambda k: k * 37 % 11, on_fault=on_fault)
+        controller, k = self.held(noisy, on_fault=on_fault)
         last = controller.update(lively(k, lambda k: 3.5), k / RATE)
         assert last.state is LoopState.HOLD
         for n in range(1, round(0.1 * RATE) + 1):
@@ -384,9 +376,9 @@ class TestFrozenReadings:
         assert command.release is (on_fault == "open")
 
     def test_one_finger_is_enough(self):
-        controller, k = self.held(lambda k: k * 37 % 11)
+        controller, k = self.held(noisy)
         for n in range(round(0.1 * RATE) + 2):
-            estimate = lively(k + n, lambda k: k * 37 % 11)
+            estimate = lively(k + n, noisy)
             still = hand((k + n) / RATE).fingers["middle"]
             fingers = {**estimate.fingers, "middle": still}
             command = controller.update(
@@ -395,37 +387,36 @@ class TestFrozenReadings:
         assert command.reason is GripReason.FROZEN
 
     def test_no_force_rises_before_it(self):
-        controller, k = self.held(lambda k: k * 37 % 11)
-        slip = {"probability": 0.05, "state": ContactState.UNSTABLE}
-        highest = []
+        controller, k = self.held(noisy)
+        slip, highest = SLIPPING["index"], []
         for n in range(20):
             command = controller.update(lively(k + n, lambda k: 3.5, **slip), (k + n) / RATE)
             highest.append(max(scales(command).values()))
         assert highest[3] == highest[-1] < 3.0
 
     @pytest.mark.parametrize(
-        "noise",
-        [lambda k: 0.0, lambda k: k // 30 % 2, lambda k: k % 40 == 0, lambda k: k // 8],
-        ids=["none", "slow flicker", "rare counts", "drift"],
+        ("noise", "rest"),
+        [
+            (lambda k: 0.0, lambda k: 0.0),
+            (lambda k: k // 30 % 2, lambda k: 0.0),
+            (lambda k: k % 40 == 0, lambda k: 0.0),
+            (lambda k: k // 8, lambda k: 0.0),
+            (lambda k: k // 2 * 37 % 11, lambda k: k // 2 * 37 % 11),
+        ],
+        ids=["none", "slow flicker", "rare counts", "drift", "each sample twice"],
     )
-    def test_a_quiet_sensor_may_rest(self, noise):
+    def test_a_quiet_sensor_may_rest(self, noise, rest):
         """Integers that repeat because nothing moves are no fault."""
         controller, k = self.held(noise)
         for n in range(300):
-            command = controller.update(lively(k + n, lambda k: 0.0), (k + n) / RATE)
+            command = controller.update(lively(k + n, rest), (k + n) / RATE)
             assert command.state is not LoopState.FAULT
 
     def test_without_a_free_sensor_before_the_grip_nothing_is_known(self):
-        controller, k = self.held(lambda k: k * 37 % 11, n_free=0)
+        controller, k = self.held(noisy, n_free=0)
         for n in range(100):
             command = controller.update(lively(k + n, lambda k: 0.0), (k + n) / RATE)
         assert command.state is LoopState.HOLD
-
-    def test_a_server_that_sends_each_sample_twice_is_healthy(self):
-        controller, k = self.held(lambda k: k // 2 * 37 % 11)
-        for n in range(300):
-            command = controller.update(lively(k + n, lambda k: k // 2 * 37 % 11), (k + n) / RATE)
-            assert command.state is not LoopState.FAULT
 
 
 def test_a_fault_that_was_reported_holds_for_one_update():
@@ -439,20 +430,20 @@ def test_a_fault_that_was_reported_holds_for_one_update():
 class TestUnits:
     def test_a_calibration_of_readings_in_newtons_is_refused(self):
         sensors = {"thumb": sensor("uskin-curved"), "pad": flat_sensor("pad", 1, 2, 1e-3, unit="N")}
-        with pytest.raises(ValueError, match=r"counts expected, those of pad are in N already"):
+        with pytest.raises(ValueError, match="pad"):
             GripController(Limits(), sensors=sensors, newtons_per_unit=1e-3)
         GripController(Limits(), sensors=sensors)
 
     @pytest.mark.parametrize("law", ["pr2", "friction-margin", "costanzo"])
     def test_a_law_that_needs_newtons_refuses_counts(self, law):
-        with pytest.raises(ValueError, match="needs forces in N and the readings are counts"):
+        with pytest.raises(ValueError, match="counts"):
             GripController(Limits(), law, sensors={"index": sensor("uskin-curved")})
         GripController(Limits(), law, sensors={"index": sensor("papillarray")})
         GripController(Limits(), law, newtons_per_unit=7e-4)
 
     @pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, (1.0, 1.0, 0.0)])
     def test_a_calibration_is_above_0(self, factor):
-        with pytest.raises(ValueError, match="newtons_per_unit: numbers above 0 expected"):
+        with pytest.raises(ValueError, match="newtons_per_unit"):
             GripController(Limits(), newtons_per_unit=factor)
 
     def test_the_law_of_holdfast_needs_no_unit(self):
@@ -466,7 +457,7 @@ class TestUnits:
             assert scales(first) == pytest.approx(scales(second))
 
     def test_an_unknown_law_is_refused(self):
-        with pytest.raises(ValueError, match="unknown law 'magic'; there are fixed, pr2"):
+        with pytest.raises(ValueError, match="'magic'"):
             GripController(Limits(), "magic")
 
 
@@ -489,9 +480,5 @@ class BrokenLaw(Fixed):
 )
 def test_a_law_that_breaks_its_contract_is_named_with_it(wishes, given_text):
     controller, time = holding(BrokenLaw(wishes))
-    with pytest.raises(ValueError) as failure:
+    with pytest.raises(ValueError, match=f"BrokenLaw.*{given_text}"):
         run(controller, time, 0.1)
-    assert str(failure.value) == (
-        "law BrokenLaw: the contract of laws expects a scale and a reason for each of "
-        f"{len(FINGERS)} fingers, {given_text}"
-    )

@@ -81,10 +81,9 @@ def scale(command):
     return max((finger.scale for finger in command.fingers.values()), default=1.0)
 
 
-@pytest.mark.parametrize("jump", [HELD, SHAKEN])
-@pytest.mark.parametrize("arrivals", [raw, assembled])
+@pytest.mark.parametrize(("arrivals", "jump"), [(raw, HELD), (assembled, SHAKEN)])
 @pytest.mark.parametrize("kind", JUMPS)
-def test_no_jump_raises_a_force(tmp_path, monkeypatch, capsys, kind, arrivals, jump):
+def test_no_jump_raises_a_force(tmp_path, monkeypatch, kind, arrivals, jump):
     recording = grasp()
     times = recording.modules["thumb"].times
     stamps = JUMPS[kind](times, jump).tolist()
@@ -94,10 +93,5 @@ def test_no_jump_raises_a_force(tmp_path, monkeypatch, capsys, kind, arrivals, j
     assert before and before[-1].fingers
     assert {scale(command) for command in after} <= {scale(before[-1])}
     assert commands[-1].state.value == "FAULT"
-    lines = capsys.readouterr().err.splitlines()
-    expected = (
-        "finite, increasing times expected" if code else "and the hand keeps its last command"
-    )
-    assert lines[-1].endswith(expected)
     # What breaks the contract of sources ends the verb; a jump ahead does not break it.
     assert code == (2 if arrivals is raw and kind != "an hour ahead" else 0)

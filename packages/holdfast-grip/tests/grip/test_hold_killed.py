@@ -67,6 +67,8 @@ BEFORE_GRIP = "between the first heartbeat and its command"
 LOOP_ENDED = "while the recording is closed"
 RECORDED = "while recording"
 """The step at which there was time to write what was recorded."""
+ALSO_HELD = (BEFORE_GRIP, "in the first command", tuple(STEPS)[8], RECORDED, LOOP_ENDED)
+"""Steps after which the hand gets something else if it is to hold and not to open."""
 LARGEST_STEP = 0.2
 """Rise of the scale in one step of the loop."""
 
@@ -98,8 +100,10 @@ def check_recording(path):
         assert "cut so early that nothing can be recovered" in str(refusal)
 
 
-@pytest.mark.parametrize("on_fault", ["open", "hold"])
-@pytest.mark.parametrize("step", STEPS)
+@pytest.mark.parametrize(
+    ("step", "on_fault"),
+    [*((step, "open") for step in STEPS), *((step, "hold") for step in ALSO_HELD)],
+)
 def test_the_watchdog_brings_the_hand_into_its_safe_state(tmp_path, grasp, step, on_fault):
     hand = "call:gripper:move"
     killed(tmp_path, step, str(grasp), "--hand", hand, "--confirm", hand, "--on-fault", on_fault)
@@ -121,12 +125,3 @@ def test_the_watchdog_brings_the_hand_into_its_safe_state(tmp_path, grasp, step,
         check_recording(tmp_path / "held.mcap")
     if step == RECORDED:
         assert load_recording(tmp_path / "held.mcap").duration > 5.0
-
-
-def test_the_twin_is_killed_while_it_is_recorded(tmp_path):
-    pytest.importorskip("mujoco", reason="mujoco is not installed")
-    uri = "twin:?object=ball&case=1&profile=finger-vigorous"
-    killed(tmp_path, RECORDED, uri, "--hand", "twin:")
-    recording = load_recording(tmp_path / "held.mcap")
-    assert not recording.complete
-    assert recording.modules.keys() == {"thumb", "index", "middle", "ring"}

@@ -85,21 +85,19 @@ def test_a_file_that_its_owner_removes_meanwhile_is_no_claim(folder, monkeypatch
     assert len(n_calls) == 3
 
 
-def test_a_symbolic_link_is_not_followed(folder, tmp_path):
-    folder.mkdir(mode=0o700, parents=True)
-    (folder / Claim("hand")._file_name).symlink_to(tmp_path / "target")
-    with pytest.raises(HandError, match=r"^cannot claim hand in .*/claims: Too many levels"):
-        Claim("hand").__enter__()
-    assert not (tmp_path / "target").exists()
-
-
-def test_the_folder_is_no_symbolic_link(folder, tmp_path):
-    folder.parent.mkdir()
-    (tmp_path / "target").mkdir(mode=0o700)
-    folder.symlink_to(tmp_path / "target")
+@pytest.mark.parametrize("link", ["file", "folder"])
+def test_a_symbolic_link_is_not_followed(folder, tmp_path, link):
+    target = tmp_path / "target"
+    if link == "file":
+        folder.mkdir(mode=0o700, parents=True)
+        (folder / Claim("hand")._file_name).symlink_to(target / "claim")
+    else:
+        folder.parent.mkdir()
+        folder.symlink_to(target)
+    target.mkdir(mode=0o700)
     with pytest.raises(HandError, match=r"^cannot claim hand in .*/claims: "):
         Claim("hand").__enter__()
-    assert list((tmp_path / "target").iterdir()) == []
+    assert list(target.iterdir()) == []
 
 
 def test_a_folder_that_others_can_use_is_refused_in_one_line(folder, tmp_path, capsys):
@@ -109,11 +107,8 @@ def test_a_folder_that_others_can_use_is_refused_in_one_line(folder, tmp_path, c
     words = ["hold", "builtin:twin", "twin:?object=can", "--hand", hand, "--armed"]
     assert main([*words, "--confirm", hand]) == 2
     out, err = capsys.readouterr()
-    assert (out, err) == (
-        "",
-        f"holdfast: cannot claim {hand} in {folder}: a folder of user {os.geteuid()} with mode "
-        f"700 expected, one of user {os.geteuid()} with mode 770 found\n",
-    )
+    assert (out, err.count("\n")) == ("", 1)
+    assert str(folder) in err and "mode 700" in err
     assert not (tmp_path / "hand").exists()
 
 

@@ -4,7 +4,6 @@ import pytest
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast_grip import FingerCommand, GripCommand, LoopState
-from holdfast_grip.errors import HandError
 from holdfast_grip.hands.live_twin import LiveTwin
 
 pytestmark = pytest.mark.slow
@@ -52,14 +51,6 @@ def test_in_real_time_a_sample_is_not_there_before_it_is_due():
     with LiveTwin(URI, speed=1e-6) as twin:
         assert twin.read(0.0) is not None
         assert twin.read(0.01) is None
-
-
-def test_commands_for_other_fingers_or_a_closed_twin_are_refused():
-    twin = LiveTwin(URI)
-    with pytest.raises(HandError, match=r"twin:.* is not open"):
-        twin.send(command(1.0))
-    with twin, pytest.raises(HandError, match="has thumb, index, middle, ring; 'toe' commanded"):
-        twin.send(GripCommand(0.0, LoopState.HOLD, {"toe": FingerCommand(1.0)}))
 
 
 def test_the_effects_of_a_server_are_refused():

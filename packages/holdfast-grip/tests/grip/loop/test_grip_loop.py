@@ -54,6 +54,13 @@ def tape():
     return Tape()
 
 
+@pytest.fixture
+def armed(tape):
+    """An armed loop that holds, and the time of its last update."""
+    controller, time = holding()
+    return GripLoop(controller, tape, armed=True), time
+
+
 def stepped(loop, time, n=10, **changes):
     for _ in range(n):
         time += 1 / RATE
@@ -75,9 +82,8 @@ def test_a_dry_run_sends_nothing_and_logs_everything(tape):
     texts = []
     with GripLoop(controller, tape, log=lambda text, _: texts.append(text)) as loop:
         stepped(loop, time, index=SLIPPING)
-    assert tape.commands == []
-    assert loop.n_sent == 0
-    assert texts == ["grip REACT: all fingers rise from 1.00 x the first force (unstable)"]
+    assert (tape.commands, loop.n_sent, len(texts)) == ([], 0, 1)
+    assert texts[0].startswith("grip REACT")
 
 
 def test_the_controller_gets_the_joints_of_the_hand_before_the_estimate(tape):
@@ -139,7 +145,7 @@ def test_a_controller_beyond_its_limits_is_stopped_by_the_guard(tape):
         loop.step(hand(time), time)
     assert {one.scale for one in tape.commands[0].fingers.values()} == {1.0}
     assert tape.commands[0].state is LoopState.FAULT
-    assert texts == ["grip FAULT (limit): thumb: a scale of 99 given, 0.8 to 3 expected"]
+    assert len(texts) == 1 and texts[0].startswith("grip FAULT (limit): thumb")
 
 
 def test_a_sample_that_is_late_by_more_than_an_update_is_no_fault(tape):
@@ -147,14 +153,6 @@ def test_a_sample_that_is_late_by_more_than_an_update_is_no_fault(tape):
     loop = GripLoop(controller, tape)
     loop.step(hand(time), time + 0.012)  # an update while nothing arrived
     assert loop.step(hand(time + 1 / RATE), time + 1 / RATE).state is LoopState.HOLD
-
-
-def test_a_clock_that_jumps_back_is_a_fault(tape):
-    controller, time = holding()
-    loop = GripLoop(controller, tape)
-    loop.step(hand(time), time)
-    command = loop.step(hand(time - 1.0), time - 1.0)
-    assert (command.state, command.reason) == (LoopState.FAULT, GripReason.STALE)
 
 
 @pytest.mark.parametrize("given", [float("nan"), float("inf")])
@@ -169,21 +167,13 @@ def test_a_time_that_is_no_time_is_a_fault_and_is_forgotten(tape, given):
 class TestClock:
     """A clock of the source that jumps ahead, and comes back or does not."""
 
-    def test_with_hold_the_loop_recovers_from_it_by_itself(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
+    @pytest.mark.parametrize("stays", [True, False])
+    def test_with_hold_the_loop_recovers_from_it_by_itself(self, armed, stays):
+        loop, time = armed
         time = stepped(loop, time)
-        loop.step(hand(time + 100.0), time + 100.0)
-        stepped(loop, time, n=100)
-        assert loop.last.state is LoopState.HOLD
-
-    def test_a_clock_that_stays_ahead_is_accepted_after_a_fault(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
-        time = stepped(loop, time)
-        time = stepped(loop, time + 100.0, n=1)
+        ahead = stepped(loop, time + 100.0, n=1)
         assert loop.last.reason is GripReason.CLOCK
-        stepped(loop, time, n=100)
+        stepped(loop, ahead if stays else time, n=100)
         assert loop.last.state is LoopState.HOLD
 
     @pytest.mark.parametrize("on_fault", ["hold", "open"])
@@ -246,9 +236,8 @@ class TestTakenOver:
 
 
 class TestFollow:
-    def test_it_sends_nothing_and_the_next_step_has_its_force(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
+    def test_it_sends_nothing_and_the_next_step_has_its_force(self, tape, armed):
+        loop, time = armed
         time = stepped(loop, time, n=1)
         for _ in range(5):
             time += 1 / RATE
@@ -259,22 +248,20 @@ class TestFollow:
         assert scales(loop.last)["index"] > 1.2
         assert loop.guard.violation == ""
 
-    def test_the_guard_checks_it(self, tape):
-        controller, time = holding()
-        loop = GripLoop(controller, tape, armed=True)
+    def test_the_guard_checks_it(self, tape, armed):
+        loop, time = armed
         time = stepped(loop, time, n=1)
-        good, controller.update = controller.update, lambda estimate, time: GripCommand(
+        good, loop.controller.update = loop.controller.update, lambda estimate, time: GripCommand(
             time, LoopState.HOLD, {name: FingerCommand(99.0) for name in FINGERS}
         )  # fmt: skip
         loop.follow(hand(time + 1 / RATE), time + 1 / RATE)
-        controller.update = good
+        loop.controller.update = good
         stepped(loop, time + 1 / RATE, n=1)
         assert tape.commands[-1].reason is GripReason.LIMIT
 
 
-def test_a_silent_hand_is_a_fault_in_which_no_force_changes(tape, monkeypatch):
-    controller, time = holding()
-    loop = GripLoop(controller, tape, armed=True)
+def test_a_silent_hand_is_a_fault_in_which_no_force_changes(tape, armed, monkeypatch):
+    loop, time = armed
     time = stepped(loop, time)
     monkeypatch.setattr(Tape, "silent", True)
     time = stepped(loop, time, index=SLIPPING)
