@@ -5,7 +5,6 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
-from holdfast.io import load_recording, save_recording
 from holdfast_lab.randomized import simulation
 from holdfast_lab.randomized.drawing import (
     MEASURED,
@@ -235,8 +234,3 @@ def test_events_fill_the_hold_and_do_not_overlap():
         assert ends[-1] < 18.0
         found |= {event.kind for event in events}
     assert found == set(EVENT_KINDS)
-
-
-def test_is_saved_and_loaded(hands, tmp_path):
-    save_recording(hands[0], tmp_path / "hand.parquet")
-    assert load_recording(tmp_path / "hand.parquet").digest == hands[0].digest

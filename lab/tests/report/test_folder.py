@@ -75,14 +75,6 @@ def test_a_study_is_only_replaced_by_force(tmp_path):
     assert "tables/old.csv" not in files(out) and "notes.txt" in files(out)
 
 
-def test_other_files_of_a_kind_are_replaced_too(tmp_path):
-    out = tmp_path / "out"
-    write(out, others={"extra.bin": b"x"})
-    assert (out / "extra.bin").read_bytes() == b"x"
-    write(out, force=True)
-    assert "extra.bin" not in files(out)
-
-
 def test_a_folder_of_other_files_is_not_changed(tmp_path):
     (tmp_path / "notes.txt").touch()
     message = (

@@ -73,13 +73,6 @@ def test_the_number_of_recordings_has_a_column_if_it_varies():
     ]
 
 
-def test_an_unknown_interval_is_left_out():
-    rows = [Row({"m": "a", "figure": "x"}, math.inf, interval=(math.inf, math.inf)),
-            Row({"m": "a", "figure": "y"}, 1.0, interval=(None, None))]  # fmt: skip
-    text = to_markdown(ResultTable("t", "T", "", rows, ("m",)))
-    assert "| a | infinite | 1.0 |" in text
-
-
 def test_an_interval_with_one_end():
     rows = [Row({"m": "a", "figure": "x"}, 1.0, interval=(0.5, None)),
             Row({"m": "a", "figure": "y"}, 1.0, interval=(None, 2.0))]  # fmt: skip
@@ -87,23 +80,7 @@ def test_an_interval_with_one_end():
     assert "<sub>from 0.5</sub>" in text and "<sub>to 2.0</sub>" in text
 
 
-def test_an_empty_table_is_laid_out():
-    made = ResultTable("t", "T", "", [], ("m",))
-    assert "| m |" in to_markdown(made)
-
-
 def test_a_value_of_the_paper_alone_has_no_difference():
     rows = [Row({"where": "Table II", "figure": "printed"}, None, 95.3)]
     alone = ResultTable("said", "What is said", "", rows, ("where",))
     assert "| Table II | *paper 95.3* |" in to_markdown(alone)
-
-
-def test_notes_name_what_is_counted():
-    rows = [Row({"law": "a", "figure": "x"}, 1.0, n=n, interval=(0.0, 2.0)) for n in (4, 1)]
-    rows = [Row({**row.keys, "law": str(k)}, row.ours, n=row.n, interval=row.interval)
-            for k, row in enumerate(rows)]  # fmt: skip
-    table = ResultTable("t", "T", "", rows, ("law",), counted="trials", has_paper=False)
-    assert notes(table) == ["Small print: 95 % interval, by bootstrap over trials."]
-    assert "trials" in to_markdown(table).splitlines()[2]
-    one = ResultTable("t", "T", "", rows[1:], ("law",), counted="trials", has_paper=False)
-    assert notes(one)[0].startswith("On 1 trial. ")

@@ -1,20 +1,5 @@
 from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast_lab.report.terminal import PRINTED_COLUMNS, print_main_table
-
-
-def test_the_table_of_real_recordings_fits_a_terminal(capsys):
-    from holdfast_lab.study.comparison.real_counts import CALLED_STABLE, MEAN_AUC, MISSED_SLIPS
-
-    assert {MEAN_AUC, CALLED_STABLE} == set(PRINTED_COLUMNS["real"])
-    keys = {"method": "FFT band energy (Fernandez 2014)", "trained on": "the others"}
-    rows = [
-        Row({**keys, "figure": figure}, 0.5) for figure in (MEAN_AUC, CALLED_STABLE, MISSED_SLIPS)
-    ]
-    table = ResultTable("real", "Real", "", rows, ("method", "trained on"), digits_of={MEAN_AUC: 2})
-    print_main_table(table)
-    printed = capsys.readouterr().out.splitlines()
-    assert [line.split()[-2:] for line in printed[2:3]] == [["0.50", "0.5"]]
-    assert max(map(len, printed)) <= 80
+from holdfast_lab.report.terminal import print_main_table
 
 
 def test_only_one_split_and_few_columns_are_printed(capsys):

@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 
 from holdfast.contact import Phase
 from holdfast.io import save_recording
 from holdfast.recordings import Truth
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study.plan import scan_corpus
 
 PHASES = (
     (0.0, Phase.FREE),
@@ -69,6 +71,33 @@ def save_all(folder, recordings):
 def save_synthetic(folder, seeds, fingers=("thumb", "index")):
     """Save one recording for each seed, of three objects in turn."""
     return save_all(folder, [synthetic_recording(f"grasp-{s}", s, fingers) for s in seeds])
+
+
+def corpora_of(folder, seeds, make=synthetic_recording):
+    """Save and scan a corpus for each role, of a recording for each of its seeds."""
+    return {
+        role: scan_corpus(
+            role,
+            save_all(folder / role, [make(f"grasp-{s}", s, ("thumb", "index")) for s in each]),
+        )
+        for role, each in seeds.items()
+    }
+
+
+def results_of(tasks):
+    """Return the result of each task by name, each call once, through msgpack as it is stored."""
+    done, results = {}, {}
+    for task in tasks:
+        key = (task.function.__qualname__, msgspec.msgpack.encode(task.arguments))
+        if key not in done:
+            done[key] = msgspec.msgpack.encode(task.function(*task.arguments))
+        results[task.name] = msgspec.msgpack.decode(done[key], type=task.result)
+    return results
+
+
+def rows_of(table, **keys):
+    """Return the rows of a table that have these keys."""
+    return [row for row in table.rows if keys.items() <= row.keys.items()]
 
 
 def recordings_of_cases(cases, start=0):

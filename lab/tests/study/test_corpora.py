@@ -60,16 +60,6 @@ def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
     assert again == corpus
 
 
-def test_corpora_of_three_rates_of_glitches():
-    rates = {
-        name: 60 * corpus.glitch_rate
-        for name, corpus in corpora.TWIN_CORPORA.items()
-        if corpus.glitch_rate is not None
-    }
-    assert rates == {"glitch-0": 0, "glitch-1": 1, "glitch-7": pytest.approx(7)}
-    assert not set(rates) & set(corpora.QUICK_CORPORA)
-
-
 def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
     given = []
     monkeypatch.setattr(

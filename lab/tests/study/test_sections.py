@@ -1,7 +1,7 @@
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.paper.published import discrepancies
-from holdfast_lab.study.sections import OUTLINES, TWIN_NOTE, PartOutput, report_sections
+from holdfast_lab.study.sections import TWIN_NOTE, PartOutput, report_sections
 
 
 def table(name, n=3):
@@ -42,8 +42,3 @@ def test_tables_of_the_twin_have_a_note():
     assert notes["confusion"] == f"Note. {TWIN_NOTE}"
     assert notes["hand"] == notes["splits"] == "Note."
     assert TWIN_NOTE not in notes["discrepancies"]
-
-
-def test_no_table_is_named_by_two_sections():
-    named = [name for outline in OUTLINES for name in outline.names]
-    assert len(named) == len(set(named))

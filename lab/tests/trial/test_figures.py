@@ -1,14 +1,11 @@
 import io
 
 import numpy as np
-import pytest
 
 from holdfast_lab.figures.dots import IntervalEstimate
-from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.figures import (
     Distribution,
     TradeOff,
-    draw_courses,
     draw_distributions,
     draw_trade_offs,
 )
@@ -39,15 +36,3 @@ def test_a_trade_off_has_both_intervals():
     assert [[1.3, 20.0], [1.5, 20.0]] in segments
     assert [[1.4, 10.0], [1.4, 30.0]] in segments
     assert len(axes.lines) == 1
-
-
-@pytest.mark.slow
-def test_courses_share_their_axes():
-    lost = TrialCourse([-0.5, 0.0, 1.0], [2.0, 2, 0], [1.0] * 3, [0, 0, 0.1], 1.0)
-    held = TrialCourse([-1.0, 0.0, 2.0], [2.0, 2, 5], [1.0] * 3, [0.0] * 3)
-    figure = drawn(draw_courses({"fixed": lost, "holdfast": held}))
-    upper, lower = figure.axes[:2], figure.axes[2:]
-    assert upper[0].get_ylim() == upper[1].get_ylim() and upper[0].get_ylim()[1] > 5
-    assert lower[0].get_xlim() == lower[1].get_xlim()
-    assert [text.get_text() for text in upper[0].texts] == ["lost"]
-    assert not upper[1].texts

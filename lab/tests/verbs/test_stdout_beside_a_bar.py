@@ -1,6 +1,5 @@
 """What verbs print goes to stdout whole, while a bar is on the terminal of stderr."""
 
-import ast
 import json
 import os
 import pty
@@ -8,16 +7,11 @@ import re
 import subprocess
 import sys
 import threading
-from pathlib import Path
 
 import pytest
 
-import holdfast
-from cli.terminal.test_status_line import WELL, Still
 from holdfast.cli import main
 from holdfast.cli.terminal import progress
-from holdfast.cli.terminal.console import print_line, print_message
-from holdfast.cli.terminal.progress import ProgressBar, StatusLine
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
@@ -153,52 +147,6 @@ def test_every_estimate_is_in_the_file(at_terminal, capsys, folder):
     assert "detecting" in shown
     assert main(words) == 0
     assert printed == capsys.readouterr().out
-
-
-def test_lines_on_the_screen_have_no_bar_between_them(at_terminal, folder, monkeypatch):
-    """With --json on a terminal the lines are the progress."""
-
-    def call():
-        monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
-        main(["detect", "builtin:noise-floor", str(folder / "grasp.parquet"), "--json"])
-
-    printed, shown = at_terminal(call)
-    assert printed.startswith('{"time":')
-    assert re.fullmatch(r"builtin:noise-floor has no slip rule: .*\r\n", shown)
-
-
-def test_messages_appear_above_the_bar(at_terminal):
-    def call():
-        with ProgressBar("working", 3):
-            print_line("data")
-            print_message("a message")
-
-    printed, shown = at_terminal(call)
-    assert printed == "data\n"
-    assert CONTROL.sub("", shown).index("a message") < shown.rindex("working")
-
-
-def test_the_status_line_leaves_stdout_alone(at_terminal):
-    def call():
-        with StatusLine(Still(WELL)) as line:
-            line.update()
-            print_line("data")
-
-    printed, shown = at_terminal(call)
-    assert printed == "data\n"
-    assert "data" not in shown
-
-
-def test_no_display_of_rich_takes_stdout():
-    """Unless it is told otherwise, each of them replaces `sys.stdout`."""
-    displays = []
-    for path in Path(holdfast.__file__).parent.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            name = getattr(getattr(node, "func", None), "id", "")
-            if isinstance(node, ast.Call) and name in ("Live", "Progress", "Status"):
-                options = {word.arg: ast.unparse(word.value) for word in node.keywords}
-                displays.append((path.name, options.get("redirect_stdout")))
-    assert displays == [("progress.py", "False"), ("progress.py", "False")]
 
 
 def test_a_reader_that_stops_ends_detect_quietly(folder):

@@ -177,10 +177,6 @@ class TestIntervals:
         )
         assert rows["difference"].interval[0] < rows["difference"].ours
 
-    def test_a_pair_of_whole_hands_has_the_scores_of_hands(self):
-        (pair,) = count_pairs([labels()], [estimates(RIGHT)], [estimates(RIGHT, fingers=())])
-        assert len(pair.first.stable) == len(pair.second.stable) == N - 40
-
 
 def test_the_auc_of_recordings_is_that_of_all_their_samples():
     scores = [

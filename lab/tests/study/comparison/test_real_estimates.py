@@ -57,14 +57,6 @@ def test_labels_of_fingers_and_hand(tmp_path):
     assert label.hand.slip.array[at].tolist() == [0, 0, 1, 0, 1, 0]
 
 
-def test_recordings_without_a_finger_of_the_corpus_are_left_out(tmp_path):
-    recordings = [synthetic_recording(f"r{k}", k, FINGERS) for k in range(2)]
-    recordings.append(synthetic_recording("other", 5, ("thumb",)).with_labels({}))
-    corpus = scan_corpus("real", save_all(tmp_path / "real", recordings))
-    assert [each.name for each in load_fingers(corpus)] == ["r0", "r1"]
-    assert [each.name for each in recording_labels(corpus)] == ["r0", "r1"]
-
-
 @pytest.mark.slow
 def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
     """They are the decisions of the study's evaluation with a fold for each recording."""

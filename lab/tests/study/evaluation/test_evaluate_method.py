@@ -11,7 +11,6 @@ from holdfast_lab.study.evaluation.alarms import READINGS
 from holdfast_lab.study.evaluation.evaluate_method import (
     BY_RATE,
     FALSE_ALARM_RATES,
-    LASTING,
     OWN,
     EvaluationEffort,
     EvaluationJob,
@@ -121,13 +120,6 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
     assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
-def test_without_a_truth_there_are_no_glitches_and_nothing_is_held(evaluations):
-    others = evaluations["others"]
-    assert all(not glitches.distances for glitches in others.glitches)
-    assert others.held == [(0, 0)] * 3
-    assert all(len(glitches.distances) == 1 for glitches in evaluations["recording"].glitches)
-
-
 def test_events_are_counted_by_exact_labels(evaluations, corpus):
     """Equal to `event_metrics` of the hand, by labels without margin."""
     _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
@@ -160,28 +152,11 @@ def test_glitches_are_counted_in_three_ways(evaluations):
         assert left_out.n_of_glitch == 0
 
 
-def test_held_states_give_fewer_alarms(evaluations):
-    alarms = evaluations["recording"].alarms
-    n_false = [sum(a.n_false_alarms for a in each) for each in (alarms[OWN], alarms[LASTING])]
-    assert n_false[1] <= n_false[0]
-
-
 def test_a_whole_hand_method_has_no_fingers(corpus):
     found = evaluate_method(EvaluationJob("jl_global_svm", corpus, effort=EFFORT))["recording"]
     assert found.fingers is None
     assert found.metrics is found.hand
     assert found.hand.pooled.brier is not None
-
-
-def test_recordings_of_one_class_are_evaluated_too(tmp_path, recordings):
-    one = recordings[0].with_labels(
-        {f: [Label(2.0, 9.0, ContactState.STABLE)] for f in recordings[0].modules}
-    )
-    folder = save_all(tmp_path / "main", [one, *recordings[1:4]])
-    found = evaluate_method(EvaluationJob("zhang", scan_corpus("main", folder), effort=EFFORT))[
-        "recording"
-    ]
-    assert len(found.held) == 4
 
 
 def test_two_recordings_of_which_one_has_one_class(tmp_path, recordings):

@@ -187,20 +187,10 @@ def hand_scores(margin, known=None, grasped=None, rate=100.0):
     )
 
 
-def test_an_unstable_sample_is_held():
-    found = hand_scores([1, 1, -1, 1, 1, 1, 1, 1]).hold(0.03).states()
-    assert found.tolist() == [STABLE] * 2 + [UNSTABLE] * 3 + [STABLE] * 3
-
-
 def test_no_state_is_held_without_a_grasped_object_or_with_an_unknown_finger():
     grasped, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
     found = hand_scores([1, 1, -1, np.inf, 1, 1], known, grasped).hold(0.04).states()
     assert found.tolist() == [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, UNSTABLE]
-
-
-def test_a_hold_time_of_zero_changes_nothing():
-    bare = hand_scores([1, -1, 1, -1, 1])
-    assert bare.hold(0.0).states().tolist() == bare.states().tolist()
 
 
 @pytest.mark.parametrize("shift", [-0.5, 0.0, 0.5])

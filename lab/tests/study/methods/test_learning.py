@@ -106,13 +106,6 @@ def test_no_motion_across_a_gap_or_a_lost_sample():
     assert rows[[5, 8, 9], 0] == pytest.approx(2 * np.sqrt(2))
 
 
-def test_a_finger_without_a_reading_has_the_same_width():
-    dead = finger([0.0, 0.01], np.full((2, 2, 3), np.nan))
-    rows = taxel_motion(hand(thumb=dead))["thumb"]
-    assert rows.shape == (2, 8)
-    assert np.isnan(rows).all()
-
-
 def test_motions_of_a_hand_are_at_the_times_of_the_first_finger():
     """At 0.03 s the thumb has its own sample, the index that of 0.023 s."""
     times, readings = np.arange(5) * 0.01, np.arange(5.0)[:, None, None] * np.ones((5, 2, 3))
@@ -142,13 +135,3 @@ def test_a_whole_hand_method_needs_two_fingers(name):
     assert str(raised.value) == (
         "the global classifier of James & Lepora needs at least two fingers, 1 given (index)"
     )
-
-
-def test_four_methods_of_james_and_lepora():
-    names = [f"jl_{scope}_{kind}" for scope in ("local", "global") for kind in ("logreg", "svm")]
-    for name in names:
-        method = METHODS[name]
-        assert (method.name, method.category) == (name, "learning")
-        assert method.whole_hand == ("global" in name)
-        assert method.recipe.name in name
-    assert len({METHODS[name].title for name in names}) == 4
