@@ -78,13 +78,6 @@ def test_against_brute_force(rows, side):
         assert np.array_equal(decisions(fitted, values[:, None]), called)
 
 
-def test_the_side_is_kept_even_where_it_is_wrong():
-    values = np.arange(10.0)
-    fitted = fit(samples(values, values > 4), "below")
-    found = fitted.probability(values[:, None])
-    assert (np.diff(found) < 0).all()
-
-
 def test_the_best_feature_is_taken_and_the_first_of_equals():
     rng = np.random.default_rng(0)
     stable = np.arange(60) % 2 == 0

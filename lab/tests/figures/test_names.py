@@ -60,18 +60,6 @@ def flat_map():
         (lambda: draw_reliability({NAME: np.array([[0.5, 0.5, 10.0]])}), 1),
         (lambda: draw_courses({NAME: COURSE}), 1),
     ],
-    ids=[
-        "recording",
-        "evaluation",
-        "hand",
-        "sensor",
-        "forces",
-        "experiment",
-        "dots",
-        "groups",
-        "reliability",
-        "courses",
-    ],
 )
 def test_a_name_with_two_dollars_is_drawn(draw, n_names):
     figure = draw()

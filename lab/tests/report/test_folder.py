@@ -49,9 +49,7 @@ def test_files_of_the_folder(tmp_path):
     ]
     assert json.loads((out / "study.json").read_text()) == {"seed": 0}
     assert (out / "figures/curve.png").read_bytes()[:4] == b"\x89PNG"
-    report = (out / "report.md").read_text()
-    assert report.startswith("# Study\n\n- seed: 0\n\n## One\n\nA text.\n\n**first**\n")
-    assert "![curve](figures/curve.png)\n\nA \\<curve\\>.\n" in report
+    assert "![curve](figures/curve.png)\n\nA \\<curve\\>.\n" in (out / "report.md").read_text()
 
 
 def test_stored_results_of_a_stopped_study_stay(tmp_path):

@@ -4,35 +4,21 @@ from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.report.table_layouts import notes, to_markdown
 
 
-def confusion(**options):
+def row(classifier, on, figure, *values):
+    return Row({"classifier": classifier, "on": on, "figure": figure}, *values)
+
+
+def confusion():
     rows = [
-        Row(
-            {"classifier": "LogReg", "on": "fresh & new", "figure": "Acc [%]"},
-            94.25,
-            95.3,
-            60,
-            (92.0, 96.04),
-        ),
-        Row(
-            {"classifier": "LogReg", "on": "fresh & new", "figure": "delay [s]"},
-            math.inf,
-            None,
-            60,
-            (0.2, math.inf),
-        ),
-        Row({"classifier": "LogReg", "on": "held out", "figure": "Acc [%]"}, 95.3, 95.3, 60),
-        Row(
-            {"classifier": "SVM", "on": "held out", "figure": "delay [s]"},
-            0.0123,
-            None,
-            60,
-            (-0.01, 0.02),
-        ),
+        row("LogReg", "fresh & new", "Acc [%]", 94.25, 95.3, 60, (92.0, 96.04)),
+        row("LogReg", "fresh & new", "delay [s]", math.inf, None, 60, (0.2, math.inf)),
+        row("LogReg", "held out", "Acc [%]", 95.3, 95.3, 60),
+        row("SVM", "held out", "delay [s]", 0.0123, None, 60, (-0.01, 0.02)),
     ]
-    given = {"note": "Of <all> N_w = 14.", "digits_of": {"delay [s]": 3}} | options
     return ResultTable(
-        "confusion", "Table I & more", rows=rows, lines=("classifier", "on"), **given
-    )
+        "confusion", "Table I & more", "Of <all> N_w = 14.", rows, ("classifier", "on"),
+        digits_of={"delay [s]": 3},
+    )  # fmt: skip
 
 
 def test_markdown_by_hand():

@@ -141,14 +141,6 @@ def test_the_file_gets_everything_and_the_terminal_none_of_it(
         assert isinstance(json.loads(lines[0]), dict)
 
 
-def test_every_estimate_is_in_the_file(at_terminal, capsys, folder):
-    words = ["detect", "builtin:noise-floor", str(folder / "grasp.parquet")]
-    printed, shown = at_terminal(lambda: main(words))
-    assert "detecting" in shown
-    assert main(words) == 0
-    assert printed == capsys.readouterr().out
-
-
 def test_a_reader_that_stops_ends_detect_quietly(folder):
     """As `| head` does: exit code 0, no message, and the cursor is shown again."""
     terminal = Terminal()

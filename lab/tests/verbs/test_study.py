@@ -35,23 +35,6 @@ VERB = Verb("study")
 run, refusal = VERB.run, VERB.refusal
 
 
-def test_own_recordings(capsys, data, tmp_path):
-    out = tmp_path / "out"
-    code, printed, err = run(capsys, data, "--out", out, "--quick", "--jobs", 1)
-    assert code == 0, err
-    assert str(out / "report.md") in printed
-    assert {path.name for path in out.iterdir()} == {
-        "report.md", "study.json", "tables", "figures", "work",
-    }  # fmt: skip
-    summary = json.loads((out / "study.json").read_text())
-    assert summary["left_out"] == []
-    assert summary["data"]["real"] == summary["data"]["main"]
-    assert "already holds a study" in refusal(capsys, data, "--out", out, "--quick")
-    code, printed, _ = run(capsys, data, "--out", out, "--quick", "--force", "--json")
-    assert code == 0, err
-    assert json.loads(printed) == json.loads((out / "study.json").read_text())
-
-
 def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)

@@ -8,7 +8,6 @@ from holdfast_lab.study.comparison import (
     jobs,
     real_recordings,
     sample_tables,
-    strongest,
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
@@ -92,12 +91,6 @@ def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables)
             assert row.ours == pytest.approx(accuracy(own) - accuracy(best))
             low, high = row.interval
             assert low <= row.ours <= high
-    for key in ("by recording", "by object", "unseen objects"):
-        with_row = {
-            row.keys["method"]
-            for row in rows_of(tables["methods"], figure=sample_tables.ACCURACY_DIFFERENCE, on=key)
-        }
-        assert len(with_row) == len(FEW) - 1
 
 
 def accuracy(metrics):
@@ -145,8 +138,6 @@ def test_ours_beside_the_strongest_baseline(results, tables):
     assert ratio.ours == pytest.approx(errors[best] / errors["holdfast"])
     low, high = ratio.interval
     assert low <= ratio.ours and (high is None or ratio.ours <= high)
-    kinds = list(dict.fromkeys((r.keys["error"], r.keys["left out"]) for r in table.rows))
-    assert kinds == [(each.title, each.left_out) for each in strongest.MEASURES]
     assert all(row.keys["baseline"] != METHODS["holdfast"].title for row in table.rows)
 
 

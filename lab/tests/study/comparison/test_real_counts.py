@@ -150,10 +150,6 @@ class TestIntervals:
         every = [labels(name=str(seed)) for seed in range(n)]
         return every, count_recordings(every, {"one": own})["one"]
 
-    def test_there_are_none_of_two_recordings(self):
-        _, counts = self.counts(2)
-        assert all(row.interval is None for row in recording_rows({}, counts, 0))
-
     def test_three_recordings_have_them(self):
         _, counts = self.counts(3)
         rows = {row.keys["figure"]: row for row in recording_rows({}, counts, 0)}

@@ -7,7 +7,6 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
-from holdfast_lab.report.result_tables import pivot
 from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison import jobs, real_recordings
 from holdfast_lab.study.methods import METHODS
@@ -60,38 +59,9 @@ def made(corpus):
         return {table.name: table for table in tables}
 
 
-def lines(table):
-    return [line.heads for line in pivot(table).lines]
-
-
-METHODS_OF_TABLES = [
-    ("builtin:any", "the twin"),
-    ("builtin:any", "the twin, 1 other"),
-    ("builtin:any", "the twin, the others"),
-    ("features of builtin:any", "the others"),
-    ("LogReg (the paper)", "the others"),
-    (METHODS["zhang"].title, "the others"),
-    (METHODS["jl_global_logreg"].title, "the others"),
-]
-
-
 def test_the_tables(made):
     assert list(made) == ["real", "real_recordings", "real_fingers", "real_pairs"]
     assert all(to_markdown(table) for table in made.values())
-    assert lines(made["real"]) == METHODS_OF_TABLES
-    names = [f"pick-{k}" for k in range(4)]
-    assert lines(made["real_recordings"]) == [(n, *m) for n in names for m in METHODS_OF_TABLES]
-    assert lines(made["real_fingers"]) == [
-        (name, finger, *method)
-        for name in names[:2]
-        for finger in ("finger1", "finger2")
-        for method in METHODS_OF_TABLES[:-1]
-    ]
-    assert lines(made["real_pairs"]) == [
-        (name, *method)
-        for name in ("all", *names[:2])
-        for method in METHODS_OF_TABLES[1:]
-    ]  # fmt: skip
 
 
 def test_all_lines_have_the_same_samples(made):

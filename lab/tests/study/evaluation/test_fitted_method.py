@@ -103,29 +103,6 @@ def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
         assert np.isfinite(samples.features).all()
 
 
-def test_a_fit_does_not_depend_on_other_recordings(corpus):
-    method = METHODS["logreg"]
-    recordings = corpus_features(method, corpus)
-    other = [*recordings[:3], scrambled(recordings[3])]
-    fitted_methods = [
-        MethodTraining.of(method, each).fit({0, 1, 2}) for each in (recordings, other)
-    ]
-    assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
-    assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
-    late = [MethodTraining.of(method, each).fit({1, 2, 3}) for each in (recordings, other)]
-    assert late[0].classifiers != late[1].classifiers
-
-
-def scrambled(recording):
-    generator = np.random.default_rng(9)
-    labels = {f: generator.permutation(codes) for f, codes in recording.labels.items()}
-    features = {u: 7 * generator.permutation(rows) for u, rows in recording.features.items()}
-    at_rest = {f: (n, 3 * a, 9 * b) for f, (n, a, b) in recording.at_rest.items()}
-    return replace(
-        recording, labels=labels, exact_labels=labels, features=features, at_rest=at_rest
-    )
-
-
 def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus)

@@ -95,15 +95,6 @@ def test_one_classifier_has_the_same_values_in_every_table(quick):
     )
 
 
-def test_one_corpus_alone(corpora):
-    plan = StudyPlan({"main": corpora["main"]}, quick=True)
-    found = made(plan)
-    on = {row.keys["on"] for row in found["unseen"].rows}
-    assert on == {"other recordings", "other objects"}
-    assert {row.keys["on"] for row in found["ablation"].rows} == {"held out", "other recordings"}
-    assert "each is tested with a fit to others" in found["confusion"].note
-
-
 def test_each_classifier_is_fitted_once():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("thumb", "index"), 150.0)
     kinds = [
