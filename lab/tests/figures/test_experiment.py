@@ -1,9 +1,8 @@
-import io
-
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
+from figures.drawing import drawn
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
@@ -30,12 +29,6 @@ def series(n=200, seed=0, **options):
     return made._replace(**options)
 
 
-def drawn(figure):
-    """Drawing causes most warnings; they are errors here."""
-    figure.savefig(io.BytesIO(), format="png", dpi=50)
-    return figure
-
-
 def lines(axes):
     return {to_hex(line.get_color()): line.get_ydata() for line in axes.lines}
 
@@ -50,22 +43,6 @@ def strips(axes):
             colour = to_hex(bars.get_facecolor()[0])
             found[names[round((low + high) / 2)]].add((round(left, 6), round(right, 6), colour))
     return found
-
-
-def test_features_are_drawn_unchanged():
-    given = series(unit="N")
-    forces, amplitude, sigma, labels = drawn(draw_features(given)).axes
-    np.testing.assert_array_equal(amplitude.lines[0].get_ydata(), given.amplitude)
-    np.testing.assert_array_equal(amplitude.lines[1].get_ydata(), given.mean)
-    np.testing.assert_array_equal(sigma.lines[0].get_ydata(), given.sigma)
-    assert forces.get_ylabel() == "$F_{tip}$ [N]"
-    assert strips(labels) == {
-        "label": {
-            (0.0, 0.5, STATE_COLOURS[NO_CONTACT]),
-            (0.5, 1.0, STATE_COLOURS[UNSTABLE]),
-            (1.0, 1.5, STATE_COLOURS[STABLE]),
-        }
-    }
 
 
 def test_predictions_are_strips_with_their_accuracy():

@@ -209,14 +209,6 @@ def test_an_unknown_mechanism_is_refused():
         RandomHold(0, measured=("glue",))
 
 
-@pytest.mark.parametrize("kind", SENSOR_KINDS)
-def test_every_kind_of_sensor_can_be_drawn(kind):
-    drawn = draw_sensor(np.random.default_rng(0), kind)
-    assert drawn.sensor.n_taxels >= 5
-    assert 30.0 <= drawn.sensor.rate <= 500.0
-    assert drawn.sensor.range is None or drawn.sensor.unit == "count"
-
-
 @pytest.mark.parametrize("seed", range(20))
 def test_friction_holds_every_object(seed):
     item = draw_object(np.random.default_rng(seed), grip=2.0, n_opposite=1)

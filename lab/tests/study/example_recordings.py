@@ -23,6 +23,8 @@ PHASES = (
 """Phases of the synthetic recordings, with their start [s]."""
 SLIPS = ((5.6, 5.9), (6.0, 6.2))
 """Slip on the first finger [s]; the pause before the second is too short for another slip."""
+TIMES = np.arange(1725) / 150
+"""Times of their samples [s]."""
 GLITCH = 8.0
 """Jump of the set point [s]."""
 PUSH = (0.0, 0.0, -1.0)
@@ -35,9 +37,7 @@ def truth_of(times, fingers):
     held = np.isin(phase, (Phase.LOCKED, Phase.DISTURBED))
     outside = np.outer(phase == Phase.DISTURBED, PUSH)
     force = np.outer(held, (2.0, 0.0, 0.0))
-    sliding = np.zeros(len(times))
-    for start, end in SLIPS:
-        sliding[(times >= start - 1e-9) & (times < end - 1e-9)] = 0.01
+    sliding = 0.01 * inside(SLIPS, times)
     jump = np.where(np.abs(times - GLITCH) < 2e-3, 0.1, 0.0)
     hand = {"phase": phase, "outside_force": outside, "set_point_error": jump}
     speeds = [sliding, *[np.zeros(len(times))] * (len(fingers) - 1)]
@@ -49,6 +49,14 @@ def truth_of(times, fingers):
             for name, speed in zip(fingers, speeds, strict=True)
         },
     )
+
+
+def inside(spans, times=TIMES):
+    """Return which times are in one of the spans, (start, end) [s]."""
+    found = np.zeros(len(times), dtype=bool)
+    for start, end in spans:
+        found |= (times >= start - 1e-9) & (times < end - 1e-9)
+    return found
 
 
 def phase_at(time):

@@ -1,7 +1,7 @@
 from holdfast_lab.report.result_tables import ResultTable, Row
 from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.study.paper.published import discrepancies
-from holdfast_lab.study.sections import TWIN_NOTE, PartOutput, report_sections
+from holdfast_lab.study.sections import PartOutput, report_sections
 
 
 def table(name, n=3):
@@ -30,15 +30,3 @@ def test_tables_are_where_they_are_named_or_with_their_part():
     ]
     assert found[0].text == "- a\n- b"
     assert [picture.name for picture in found[-2].figures] == ["forces"]
-
-
-def test_tables_of_the_twin_have_a_note():
-    made = {
-        "paper": PartOutput([table("confusion"), table("splits", None), discrepancies()], []),
-        "real": PartOutput([table("hand")], []),
-    }
-    found = report_sections(made, [], [], twin=True)
-    notes = {table.name: table.note for section in found for table in section.tables}
-    assert notes["confusion"] == f"Note. {TWIN_NOTE}"
-    assert notes["hand"] == notes["splits"] == "Note."
-    assert TWIN_NOTE not in notes["discrepancies"]

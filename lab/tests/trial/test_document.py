@@ -72,3 +72,12 @@ class TestExample:
         for each in results.values():
             each[:4] = [msgspec.structs.replace(one, held=False) for one in each[:4]]
         assert example_of(results) == 6  # 4 was not held either, and fixed holds 5
+
+
+def test_laws_are_compared_with_ours_and_with_fixed(document):
+    assert {name: list(by_law) for name, by_law in document["paired"].items()} == {
+        "fixed": ["pr2", "holdfast"],
+        "holdfast": ["fixed", "pr2"],
+    }
+    found = document["paired"]["fixed"]["holdfast"]
+    assert found["dropped"]["value"] == pytest.approx(-100 * 7 / 11)

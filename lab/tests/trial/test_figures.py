@@ -1,17 +1,10 @@
-import io
-
 import numpy as np
 
+from figures.drawing import drawn
 from holdfast_lab.trial.figures import (
     Distribution,
     draw_distributions,
 )
-
-
-def drawn(figure):
-    """Drawing causes most warnings; they are errors here."""
-    figure.savefig(io.BytesIO(), format="png", dpi=50)
-    return figure
 
 
 def test_a_curve_ends_at_the_share_of_finite_values():

@@ -82,12 +82,6 @@ def content(source, seconds):
     return got
 
 
-def test_arrivals_come_in_order(clock):
-    with ScriptedDevice(clock, [sample(100.1), sample(100.2)]) as source:
-        assert content(source, 0.5) == [(100.1, "sample"), (100.2, "sample")]
-        assert not source.ended
-
-
 def test_a_timeout_gives_none(clock):
     with ScriptedDevice(clock, []) as source:
         assert source.read(0.2) is None

@@ -56,18 +56,6 @@ def path(tmp_path):
     return str(tmp_path / "grasp.parquet")
 
 
-def put_together(arrivals):
-    """Times and readings of each module."""
-    found = {}
-    for arrival in arrivals:
-        for name, sample in arrival.samples.items():
-            found.setdefault(name, []).append((arrival.time, sample))
-    return {
-        name: (np.array([t for t, _ in rows]), np.array([r for _, r in rows]))
-        for name, rows in found.items()
-    }
-
-
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
     """Offline detection is the detector fed with the recording."""
@@ -218,29 +206,6 @@ def test_damage_in_its_middle_ends_it_with_a_notice(tmp_path, monkeypatch):
     assert not any(arrival.notices for arrival in arrivals[:-1])
 
 
-def test_a_deleted_file_ends_a_loop_with_a_notice(tmp_path):
-    save_recording(hand(), tmp_path / "a.parquet")
-    with ReplaySource(tmp_path / "a.parquet", speed=0, loop=True) as source:
-        got = list(itertools.islice(source, 75))
-        (tmp_path / "a.parquet").unlink()
-        got += list(source)
-        assert source.ended
-    assert got[-1].notices == (
-        f"the rest is lost: {tmp_path}/a.parquet does not exist; a recording's file expected",
-    )
-    assert len(got) == 76
-
-
-def test_samples_out_of_order_are_reported(monkeypatch):
-    early, late = hand(600), hand(600)
-    monkeypatch.setattr(
-        "holdfast.devices.sources.replay.read_chunks", lambda *_, **__: iter([early, late])
-    )
-    with ReplaySource("a.parquet", speed=0) as source:
-        (refused,) = [arrival for arrival in source if arrival.n_refused]
-    assert refused.notices == (f"{refused.n_refused} samples are out of order and were left out",)
-
-
 @pytest.mark.parametrize("speed", [-1.0, np.nan, np.inf])
 def test_an_invalid_speed(speed):
     with pytest.raises(ValueError, match="speed"):
@@ -262,15 +227,6 @@ def test_only_opening_finds_that_it_cannot_be_read(tmp_path, name, content, mess
     source = open_source(str(tmp_path / name))
     with pytest.raises(RecordingError, match=message):
         source.open()
-
-
-def test_a_file_without_permission(path, monkeypatch):
-    def refuse(*args, **options):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("holdfast.devices.sources.replay.read_chunks", refuse)
-    with pytest.raises(RecordingError, match="Permission denied"):
-        ReplaySource(path).open()
 
 
 def test_a_recording_without_pieces(path, monkeypatch):

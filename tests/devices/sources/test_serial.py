@@ -4,7 +4,6 @@ import sys
 import time
 from contextlib import contextmanager
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -13,7 +12,6 @@ from devices.sources.board import Board, packet, some
 from holdfast.contact import Fault
 from holdfast.devices.sources import base, open_source
 from holdfast.errors import MissingExtra, SourceError
-from holdfast.sensors import sensor
 
 LIMIT = 20.0
 """A test that hangs fails after this [s]."""
@@ -96,15 +94,6 @@ def test_samples_that_come_together_are_a_period_apart(board):
     assert arrivals[-1].time == arrivals[-1].received
 
 
-def test_samples_that_waited_are_late(board):
-    with started(board) as source:
-        time.sleep(0.5)
-        board.send(b"".join(map(packet, some(30))))
-        arrivals = samples_of(source, 30)
-    assert arrivals[0].faults == {"finger1": (Fault.LATE,)}
-    assert arrivals[-1].faults == {}
-
-
 def test_a_board_may_carry_several_sensors(board):
     given = some(1, 10)
     with started(board, "?mags=10&fingers=2:thumb&baud=9600", n_mags=10) as source:
@@ -112,31 +101,6 @@ def test_a_board_may_carry_several_sensors(board):
         (arrival,) = samples_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0, :5])
     np.testing.assert_array_equal(arrival.samples["thumb"], given[0, 5:])
-
-
-def test_a_sensor_from_a_file(board, tmp_path):
-    path = tmp_path / "mine.json"
-    mine = sensor("papillarray").to_dict() | {"name": "mine", "unit": "count"}
-    path.write_bytes(msgspec.json.encode(mine))
-    given = some(1, 9)
-    with started(board, f"?sensor={path}", n_mags=9) as source:
-        board.send(packet(given[0]))
-        np.testing.assert_array_equal(samples_of(source, 1)[0].samples["finger1"], given[0])
-        assert source.sensors["finger1"].name == "mine"
-
-
-def test_garbage_is_counted_and_reported(board):
-    given = some(4)
-    with started(board) as source:
-        board.send(*map(packet, given[:2]), b"\xff" * 200 + b"\r\n", *map(packet, given[2:]))
-        arrivals = wait_for(
-            source, lambda a: a.samples and (a.samples["finger1"] == given[3]).all()
-        )
-    samples = [arrival.samples["finger1"] for arrival in arrivals if arrival.samples]
-    np.testing.assert_array_equal(samples, given)
-    assert sum(arrival.n_refused for arrival in arrivals) == 3
-    notices = [notice for arrival in arrivals for notice in arrival.notices]
-    assert notices == ["invalid packets are dropped"]
 
 
 def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
@@ -194,12 +158,6 @@ def test_a_port_without_permission_is_an_error(board, monkeypatch):
     monkeypatch.setattr(module, "comports", list)
     with pytest.raises(SourceError, match="dialout"):
         open_source(f"serial://{board.path}").open()
-
-
-def test_a_file_that_is_no_port_is_an_error(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(SourceError, match="Could not configure port"):
-        open_source(f"serial://{tmp_path}/file").open()
 
 
 def test_a_port_can_be_opened_once(board):

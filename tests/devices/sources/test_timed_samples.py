@@ -73,12 +73,6 @@ def test_a_module_that_stops_and_one_that_never_comes():
     assert_same(timed_samples([recording]), recording)
 
 
-def test_samples_are_in_native_byte_order():
-    recording = Recording("made", {"thumb": module(np.arange(5.0), dtype=">u2")})
-    for item in timed_samples([recording]):
-        assert item.samples["thumb"].dtype == np.dtype("=u2")
-
-
 def test_markers_come_after_the_samples_of_their_time():
     markers = ((0.05, "closed"), (0.055, "two\nlines"), (0.05, "and held"))
     got = list(timed_samples([hand(20, markers=markers)]))

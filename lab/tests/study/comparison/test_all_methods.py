@@ -98,18 +98,6 @@ def accuracy(metrics):
     return 100 * right / n
 
 
-def test_all_methods_are_scored_on_the_same_samples(results):
-    """A hand has as many scored samples by every method; a longer history leaves more out."""
-    for key in ("recording", "others"):
-        n = {name: results[f"methods/{name}"][key].hand.pooled.n for name in FEW}
-        assert len(set(n.values())) == 1
-    without = {
-        name: sum(n for _, n in results[f"methods/{name}"]["recording"].hand_without_estimate)
-        for name in FEW
-    }
-    assert without["jl_global_logreg"] < without["logreg"] == without["zhang"]
-
-
 def test_false_alarms_add_up(tables):
     for row in rows_of(tables["events"], figure="false alarms under stable label, per minute"):
         place = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
@@ -146,16 +134,3 @@ def test_the_figures_can_be_drawn(plan, results):
     assert [each.name for each in drawn] == ["methods", "alarms", "reliability"]
     for each in drawn:
         each.figure.draw_without_rendering()
-
-
-def test_a_quick_study_evaluates_less(plan, monkeypatch):
-    monkeypatch.setattr(jobs, "METHODS", METHODS)
-    quick = StudyPlan(plan.corpora, quick=True)
-    assert not set(jobs.SLOW_METHODS) & set(jobs.method_titles(quick))
-    assert jobs.method_job(quick, "zhang").tests == ()
-    assert jobs.method_job(quick, "logreg").tests == tuple(
-        plan.corpora[role] for role in ("others", "gentle", "glitch-1")
-    )
-    assert sum(t.cost for t in all_methods.tasks(quick)) < sum(
-        t.cost for t in all_methods.tasks(plan)
-    )

@@ -74,17 +74,6 @@ def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
         assert (each.known.array == (decided.hand.states != UNKNOWN)).all()
 
 
-@pytest.mark.slow
-def test_alarms_come_from_states_that_are_held(corpus):
-    """A hand that is not stable stays so for 0.1 s: 15 samples at 150 Hz."""
-    for each in method_estimates("difference", corpus, seed=0):
-        states, alarms = each.hand.states.array, each.alarm_states.array
-        assert ((alarms == UNSTABLE) >= (states == UNSTABLE)).all()
-        assert (alarms == UNSTABLE).sum() > (states == UNSTABLE).sum()
-        ends = np.flatnonzero((alarms[:-1] == UNSTABLE) & (alarms[1:] == STABLE))
-        assert len(ends) and all((states[end - 13 : end + 1] == STABLE).all() for end in ends)
-
-
 def test_whole_hand_methods_have_no_fingers(corpus):
     found = method_estimates("jl_global_logreg", corpus, 0)
     assert all(not each.fingers and each.known.array.any() for each in found)

@@ -64,14 +64,6 @@ def test_the_tables(made):
     assert all(to_markdown(table) for table in made.values())
 
 
-def test_all_lines_have_the_same_samples(made):
-    n = {}
-    for row in made["real_fingers"].rows:
-        if row.keys["figure"] == "stable samples":
-            n.setdefault((row.keys["recording"], row.keys["finger"]), set()).add(row.ours)
-    assert n and all(len(each) == 1 for each in n.values())
-
-
 def test_a_shaken_hold_is_ranked_below_a_calm_one(made):
     energy = METHODS["zhang"].title
     areas = [row.ours for row in made["real_fingers"].rows

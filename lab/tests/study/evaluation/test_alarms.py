@@ -18,9 +18,8 @@ from holdfast_lab.study.evaluation.alarms import (
 )
 from holdfast_lab.study.evaluation.fitted_method import Scores
 from study.evaluation.test_fitted_method import recording_at
-from study.example_recordings import GLITCH
+from study.example_recordings import GLITCH, TIMES, inside
 
-TIMES = np.arange(1725) / 150
 EVERYWHERE = np.ones(1725, dtype=bool)
 
 
@@ -36,18 +35,14 @@ def labels_of(codes):
     return AlarmLabels(codes, nowhere, nowhere)
 
 
-def inside(*spans):
-    return np.any([(a - 1e-9 <= TIMES) & (b - 1e-9 > TIMES) for a, b in spans], axis=0)
-
-
 def where(*spans):
     """Stable but in those spans [s]."""
-    return np.where(inside(*spans), UNSTABLE, STABLE).astype(np.int8)
+    return np.where(inside(spans), UNSTABLE, STABLE).astype(np.int8)
 
 
 def readings(*spans):
     """Labels of a finger that is not stable in those spans, and in a glitch."""
-    glitch = inside((GLITCH, GLITCH + 0.1))
+    glitch = inside([(GLITCH, GLITCH + 0.1)])
     labels = np.where(glitch, UNSTABLE, where(*spans)).astype(np.int8)
     recording = recording_at({"thumb": TIMES})
     calm = np.where(glitch, STABLE, labels).astype(np.int8)

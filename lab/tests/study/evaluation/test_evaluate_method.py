@@ -7,10 +7,7 @@ import pytest
 from holdfast.contact import UNKNOWN, ContactState
 from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
-from holdfast_lab.study.evaluation.alarms import READINGS
 from holdfast_lab.study.evaluation.evaluate_method import (
-    BY_RATE,
-    FALSE_ALARM_RATES,
     OWN,
     EvaluationEffort,
     EvaluationJob,
@@ -130,26 +127,6 @@ def test_events_are_counted_by_exact_labels(evaluations, corpus):
         assert len(alarms.delays) == known.n_events
         assert alarms.n_under_stable == known.false_alarms["STABLE"]
         assert alarms.n_false_alarms == sum(known.false_alarms.values())
-
-
-def test_more_false_alarms_call_less_stable(evaluations):
-    curve = [evaluations["recording"].alarms[name] for name in BY_RATE]
-    assert len(curve) == len(FALSE_ALARM_RATES)
-    not_stable = [sum(alarms.n_events_not_stable for alarms in point) for point in curve]
-    assert not_stable == sorted(not_stable)
-
-
-def test_glitches_are_counted_in_three_ways(evaluations):
-    """The jump of the recordings is an event, a false alarm if detected, or left out."""
-    readings = evaluations["recording"].readings
-    assert tuple(readings) == READINGS
-    own = {name: each[OWN] for name, each in readings.items()}
-    for event, false, left_out in zip(*(own[name] for name in READINGS), strict=True):
-        assert len(event.delays) == len(false.delays) + 1 == len(left_out.delays) + 1
-        assert event.stable_seconds == pytest.approx(false.stable_seconds - 0.1, abs=0.02)
-        assert left_out.stable_seconds == pytest.approx(false.stable_seconds - 0.37, abs=0.03)
-        assert false.n_under_stable >= left_out.n_under_stable
-        assert left_out.n_of_glitch == 0
 
 
 def test_a_whole_hand_method_has_no_fingers(corpus):

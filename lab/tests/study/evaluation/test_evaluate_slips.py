@@ -23,7 +23,7 @@ from holdfast_lab.study.evaluation.fitted_method import MethodTraining, probabil
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
-from study.example_recordings import SLIPS, corpora_of, recording_with_truth, save_synthetic
+from study.example_recordings import SLIPS, corpora_of, inside, recording_with_truth, save_synthetic
 
 pytestmark = pytest.mark.slow
 
@@ -41,20 +41,16 @@ def recordings(corpus):
     return corpus_features(METHODS["difference"], corpus)
 
 
-def inside(times, spans):
-    return np.any([(times >= a - 1e-9) & (times < b - 1e-9) for a, b in spans], axis=0)
-
-
 def test_the_truth_is_that_of_each_finger(recordings):
     truth = recordings[0].slips
     times = recordings[0].times["thumb"]
-    np.testing.assert_array_equal(truth["thumb"].codes == SLIDING, inside(times, SLIPS))
+    np.testing.assert_array_equal(truth["thumb"].codes == SLIDING, inside(SLIPS, times))
     assert not (truth["index"].codes == SLIDING).any()
     assert [len(truth[name].slips) for name in ("thumb", "index")] == [len(SLIPS), 0]
-    held = inside(times, [(2.3, 9.5)])
+    held = inside([(2.3, 9.5)], times)
     np.testing.assert_array_equal(truth["index"].codes == STILL, held)
-    assert truth["index"].quiet[held & inside(times, [(3.0, 5.0)])].all()
-    assert not truth["index"].quiet[inside(times, [(5.4, 6.4)])].any()
+    assert truth["index"].quiet[held & inside([(3.0, 5.0)], times)].all()
+    assert not truth["index"].quiet[inside([(5.4, 6.4)], times)].any()
 
 
 def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
@@ -70,8 +66,8 @@ def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
 def test_a_hand_slides_if_one_of_its_fingers_slides(recordings):
     labels = recordings[0].slip_labels(HAND)
     times = recordings[0].times["thumb"]
-    np.testing.assert_array_equal(labels == UNSTABLE, inside(times, SLIPS))
-    assert ((labels == UNKNOWN) == ~inside(times, [(2.3, 9.5)])).all()
+    np.testing.assert_array_equal(labels == UNSTABLE, inside(SLIPS, times))
+    assert ((labels == UNKNOWN) == ~inside([(2.3, 9.5)], times)).all()
 
 
 def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):

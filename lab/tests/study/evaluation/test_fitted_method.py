@@ -129,15 +129,8 @@ def without(recording, finger):
     def rest(each):
         return {name: value for name, value in each.items() if name != finger}
 
-    return replace(
-        recording,
-        times=rest(recording.times),
-        amplitude=rest(recording.amplitude),
-        labels=rest(recording.labels),
-        exact_labels=rest(recording.exact_labels),
-        at_rest=rest(recording.at_rest),
-        features=rest(recording.features),
-    )
+    names = ("times", "amplitude", "labels", "exact_labels", "at_rest", "features")
+    return replace(recording, **{name: rest(getattr(recording, name)) for name in names})
 
 
 def test_one_class_gives_no_classifier_and_no_scores(corpus):

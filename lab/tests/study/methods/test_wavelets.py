@@ -23,14 +23,6 @@ def test_energy_by_hand():
     np.testing.assert_allclose(found[:, 0], [NAN, NAN, NAN, 2.5, 8.0, 0.5])
 
 
-def test_the_deployed_window_has_seven_pairs():
-    # 0, 2, 0, 2, ... : every detail is -sqrt(2) or sqrt(2), so E = 7 x 2.
-    hand = pressed(along_normal([0, 2] * 10))
-    found = METHODS["zhang"].features(hand)["index"][:, 0]
-    assert np.isnan(found[:13]).all()
-    np.testing.assert_allclose(found[13:], 14.0)
-
-
 def test_energy_does_not_depend_on_shear():
     values = along_normal(np.arange(30.0) ** 2)
     sheared = values + np.outer(np.arange(30) % 7, [1.0, -2.0, 0.0])

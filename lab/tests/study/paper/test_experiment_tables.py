@@ -10,19 +10,17 @@ from holdfast.recordings import Truth
 from holdfast_lab.study.paper import experiment_tables
 from holdfast_lab.study.paper.experiment_tables import find_disturbances, stable_after_lock
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from study.example_recordings import recording_with_truth, save_all, truth_of
+from study.example_recordings import TIMES, inside, recording_with_truth, save_all, truth_of
 
 pytestmark = pytest.mark.slow
 
-TIMES = np.arange(1725) / 150
 TRUTH = truth_of(TIMES, ("thumb", "index"))
 """Locked at 2.3 s, disturbed from 5.3 to 6.5 s, released at 9.5 s."""
 
 
 def states(*spans, state=UNSTABLE):
     """Stable, but in those spans [s] another state."""
-    inside = np.any([(a - 1e-9 <= TIMES) & (b - 1e-9 > TIMES) for a, b in spans], axis=0)
-    return np.where(inside, state, STABLE).astype(np.int8)
+    return np.where(inside(spans), state, STABLE).astype(np.int8)
 
 
 def hand(codes):

@@ -6,7 +6,6 @@ from hypothesis import strategies as st
 from holdfast.classifiers import Fitted, Linear, Samples
 from holdfast.classifiers.logreg import LogisticRegression
 from holdfast.features import DEPLOYED_FEATURES
-from holdfast_lab.classifiers.threshold import best_cut
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
     CONFUSION_RATES,
@@ -131,20 +130,6 @@ def test_class_weights_are_fixed_whatever_the_search_draws(corpora):
         budget = FitBudget(4, 500)
         (cell,) = evaluate_variants(main, "index", 14, kinds, budget, 0, thorough=False)
         assert cell.parameters["class_weight"] == weight
-
-
-def test_a_threshold_has_nothing_to_search_and_calls_little_energy_stable(corpora):
-    kinds = [("threshold", ("energy",))]
-    main = {"main": corpora["main"]}
-    (cell,) = evaluate_variants(main, "index", 14, kinds, BUDGET, 0, thorough=False)
-    assert cell.parameters == {}
-    pool = pool_samples(corpora["main"], 150.0, "index", 14, seed=0)
-    train = pool.parts >= 5
-    energy = pool.select(["energy"]).features[:, 0]
-    cut = best_cut(energy[train], pool.samples.positive[train], "below").value
-    right = (energy <= cut) == pool.samples.positive
-    tn, _, _, tp = np.sum(cell.counts[HELD_OUT], axis=0)
-    assert tn + tp == right[~train].sum()
 
 
 RULE = Fitted(Linear((0.0,), (1.0,), ((1.0,),), (0.0,)), 0.5)

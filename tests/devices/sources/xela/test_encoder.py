@@ -15,7 +15,7 @@ from holdfast.devices.sources.xela.encoder import (
     SampleBatcher,
     XelaEncoder,
 )
-from holdfast.sensors import Sensor, hand, sensor
+from holdfast.sensors import hand, sensor
 from holdfast.sensors.xela_models import flat_grid
 
 from .build import START, counts
@@ -93,21 +93,6 @@ def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
         if isinstance(value, list | str) and field not in ("model", "handedness"):
             assert len(packet["1"][field]) == len(value)
     assert packet["1"]["model"].lower() == real["1"]["model"].lower()
-
-
-def test_fields_of_1_8():
-    encoder = XelaEncoder({"thumb": newtons()}, version="1.8")
-    packet = parsed(encoder, {"thumb": np.zeros((16, 3))})
-    assert list(packet) == ["message", "time", "sensors", "type", "version", "1", "sendtime"]
-    assert list(packet["1"]) == [
-        "time", "sensor", "data", "model", "taxels",
-        "calibrated", "integer", "temp", "handedness", "ups",
-    ]  # fmt: skip
-    assert (packet["type"], packet["sendtime"], packet["1"]["time"]) == (
-        "routine",
-        START + 1,
-        START,
-    )
 
 
 def test_the_first_message_is_welcome():
@@ -210,21 +195,6 @@ class TestReadings:
         errors = counted.samples["a"] - (REST_READING + force / NEWTONS_PER_TAXEL_COUNT)
         assert np.abs(errors[known]).max() <= 0.5
         assert counted.samples["a"][2, 1] == REST_READING[1]
-
-    def test_another_shape(self):
-        with pytest.raises(ValueError, match=r"\(15, 3\)"):
-            XelaEncoder({"a": sensor("uskin-4x4")}).packet({"a": np.zeros((15, 3))}, 0.0, 0.0)
-
-
-def test_a_sensor_unknown_to_xela_keeps_its_name():
-    own = Sensor("mine", np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1]), 50.0)
-    packet = parsed(XelaEncoder({"a": own}), {"a": np.zeros((2, 3))})
-    assert (packet["1"]["model"], packet["1"]["ups"]) == ("mine", [50.0, 50.0])
-
-
-def test_an_unknown_version():
-    with pytest.raises(ValueError, match=r"2\.0"):
-        XelaEncoder(TIPS, version="2.0")
 
 
 def batches(batcher, given):

@@ -7,13 +7,6 @@ from holdfast.devices.sources.xela.client import XelaSource
 from holdfast.sensors import sensor
 
 
-def test_a_uri_makes_a_source_and_does_not_connect():
-    source = open_source("xela://auto?values=calibrated&fingers=1:thumb&sensor=uskin-4x6")
-    assert isinstance(source, XelaSource)
-    assert source.name == "xela://auto?values=calibrated&fingers=1:thumb&sensor=uskin-4x6"
-    assert (source.paced, source.ended) == (True, False)
-
-
 def test_a_sensor_from_a_file(tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(sensor("uskin-4x4").to_dict()))
