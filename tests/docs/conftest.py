@@ -56,12 +56,11 @@ def csv_recordings(folder):
         (folder / name).mkdir()
         for seed in (0, 1, 2):
             (module,) = synthetic_recording(f"grasp{seed}", seed, ("thumb",)).modules.values()
-            columns = np.column_stack(
-                [module.times, module.readings.reshape(len(module.times), -1)]
-            )
+            columns = np.c_[module.times, module.readings.reshape(module.n_samples, -1)]
             names = ["time", *(f"s{k}" for k in range(columns.shape[1] - 1))]
             np.savetxt(
-                folder / name / f"grasp{seed}.csv", columns, fmt="%.6f", delimiter=",",
+                folder / name / f"grasp{seed}.csv", columns, delimiter=",",
+                fmt=["%.6f"] + ["%d"] * (columns.shape[1] - 1),
                 header=",".join(names), comments="",
             )  # fmt: skip
 

@@ -117,6 +117,3 @@ def test_no_file_is_overwritten(tmp_path):
     with pytest.raises(OutputError, match=r"a\.csv exists already"):
         export([Recording(name, {"b": tactile()}) for name in ("0", "a")], tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.csv"]
-    (tmp_path / "file").write_text("mine")
-    with pytest.raises(OutputError, match="a folder"):
-        export([Recording("a", {"b": tactile()})], tmp_path / "file")

@@ -200,8 +200,6 @@ def test_a_carried_hand_moves_all_the_time(carrier):
     n = min(len(plain.truth.times), len(carried.truth.times))
     change = carried.truth.hand["gravity"][:n] - plain.truth.hand["gravity"][:n]
     assert np.abs(change).max() > 0.05
-    simulated_again = simulate_random(RandomHold(number, seed=3, measured=(carrier,)))
-    assert simulated_again.digest == carried.digest
 
 
 def test_an_unknown_mechanism_is_refused():

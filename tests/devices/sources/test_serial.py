@@ -1,6 +1,3 @@
-import importlib
-import itertools
-import sys
 import time
 from contextlib import contextmanager
 
@@ -11,7 +8,7 @@ import holdfast.devices.sources.serial as module
 from devices.sources.board import Board, packet, some
 from holdfast.contact import Fault
 from holdfast.devices.sources import base, open_source
-from holdfast.errors import MissingExtra, SourceError
+from holdfast.errors import SourceError
 
 LIMIT = 20.0
 """A test that hangs fails after this [s]."""
@@ -212,13 +209,3 @@ def test_another_number_of_magnetometers_after_opening_is_an_error(board):
 def test_invalid_parameters(text, message):
     with pytest.raises(ValueError, match=message):
         open_source(text)
-
-
-def test_without_pyserial_the_extra_is_named(monkeypatch):
-    monkeypatch.delitem(sys.modules, "holdfast.devices.sources.serial")
-    for name in list(itertools.chain(sys.modules)):
-        if name.split(".")[0] == "serial":
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(MissingExtra, match="serial"):
-        importlib.import_module("holdfast.devices.sources.serial")

@@ -204,11 +204,20 @@ def batches(batcher, given):
     return [(one.time, {n: (s, one.times[n]) for n, s in one.samples.items()}) for one in due]
 
 
-def test_one_instant_is_one_batch():
-    given = [(t, {"a": 10 + t, "b": 20 + t}) for t in range(3)]
-    expected = [(t, {"a": (10 + t, t), "b": (20 + t, t)}) for t in range(3)]
-    for own_stamps in (False, True):
-        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == expected
+LATE = MAX_MODULE_WAIT + 0.1
+TOGETHER = [(t, {"a": 10 + t, "b": 20 + t}) for t in range(3)]
+TOGETHER_BATCHES = [(t, {"a": (10 + t, t), "b": (20 + t, t)}) for t in range(3)]
+ALONE = [(t, {"a": t}) for t in (0.0, 0.9 * MAX_MODULE_WAIT, MAX_MODULE_WAIT, LATE)]
+ALONE_BATCHES = [(t, {"a": (t, t)}) for t in (MAX_MODULE_WAIT, LATE)]
+
+
+@pytest.mark.parametrize("own_stamps", [False, True])
+@pytest.mark.parametrize(
+    ("given", "expected"), [(TOGETHER, TOGETHER_BATCHES), (ALONE, ALONE_BATCHES)]
+)
+def test_samples_of_an_instant_and_of_one_module_are_batches(own_stamps, given, expected):
+    """A module that never arrives is waited for once."""
+    assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == expected
 
 
 def test_with_own_stamps_every_sample_is_passed_on_at_once():
@@ -236,17 +245,6 @@ def test_a_module_with_its_next_sample_does_not_wait():
         (0.1, {"a": (3, 0.1), "b": (2, 0.0)}),
         (0.2, {"a": (4, 0.2), "b": (2, 0.0)}),
     ]
-
-
-def test_a_module_that_never_arrives_is_waited_for_once():
-    for own_stamps in (False, True):
-        given = [
-            (t, {"a": t})
-            for t in (0.0, 0.9 * MAX_MODULE_WAIT, MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
-        ]
-        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == [
-            (t, {"a": (t, t)}) for t in (MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
-        ]
 
 
 def test_a_module_that_arrives_late_is_passed_on_from_then():

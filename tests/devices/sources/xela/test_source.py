@@ -16,18 +16,13 @@ def test_a_sensor_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("query", "text"),
     [
-        ("value=counts", "unknown parameter value; there are values, fingers, sensor"),
-        ("values=force", "values=counts or calibrated expected, 'force' given"),
-        ("fingers=thumb", "fingers=1:thumb,2:index expected, 'thumb' given"),
-        ("sensor=nothing", "sensor=FILE.json or one of uskin-curved, "),
+        ("value=counts", "unknown parameter value"),
+        ("values=force", "'force'"),
+        ("fingers=thumb", "'thumb'"),
+        ("sensor=nothing", "uskin-curved"),
+        ("sensor=/none/nothing.json", "nothing.json"),
     ],
 )
 def test_what_is_refused(query, text):
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match=text):
         open_source(f"xela://auto?{query}")
-    assert str(refusal.value).startswith(f"xela://auto?{query}: {text}")
-
-
-def test_a_sensor_that_is_no_file(tmp_path):
-    with pytest.raises(ValueError, match=r"nothing\.json"):
-        open_source(f"xela://auto?sensor={tmp_path}/nothing.json")
