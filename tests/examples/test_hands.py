@@ -176,9 +176,3 @@ class TestAction:
         assert action_gripper.client.goals == [
             {"name": ["finger_joint"], "position": [0.0], "effort": [20.0]}
         ]
-
-    def test_a_goal_that_was_refused_ends_the_loop(self, action_gripper):
-        action_gripper.client.accepts = False
-        action_gripper.set_force(1.0)
-        with pytest.raises(RuntimeError, match="refused a goal"):
-            action_gripper.set_force(1.2)

@@ -39,12 +39,6 @@ def test_a_rate_of_zero_false_alarms_is_marked_zero():
     assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (0.5, 40.0)
 
 
-def test_alarms_without_curves():
-    drawn(draw_alarms({}))
-    drawn(draw_alarms({"missed": {}}))
-    drawn(draw_alarms({"missed": {"a": PlottedCurve(np.zeros(2), np.zeros(2))}}))
-
-
 @pytest.mark.slow
 def test_reliability_shows_bins_and_sample_counts():
     table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])

@@ -89,10 +89,3 @@ def test_a_failed_write_changes_nothing(tmp_path):
     with pytest.raises(ValueError, match="figure's name"):
         write_report(out, STUDY, "Other", {}, broken, {}, force=True)
     assert {name: (out / name).read_bytes() for name in files(out)} == before
-
-
-def test_two_tables_of_one_name_are_refused(tmp_path):
-    twice = [Section("One", "", [table("first"), table("first")])]
-    with pytest.raises(ValueError, match="'first'"):
-        write_report(tmp_path / "out", STUDY, "Study", {}, twice, {})
-    assert not (tmp_path / "out").exists()

@@ -7,11 +7,10 @@ from holdfast_lab.report.sections import Section
 from holdfast_lab.trial import experiment
 from holdfast_lab.trial import plan as trial_plan
 from holdfast_lab.trial.course import TrialCourse
-from holdfast_lab.trial.document import document_of, example_of
 from holdfast_lab.trial.experiment import run_trials
 from holdfast_lab.trial.plan import TrialPlan
 
-from .example_results import invented, results_of
+from .example_results import invented
 
 LAWS = ("fixed", "holdfast")
 
@@ -66,11 +65,3 @@ def test_finished_trials_are_not_run_again(tmp_path, calls, undrawn):
     assert messages[0] == "4 of 8 tasks are already done"
     run_trials(TrialPlan(LAWS, 6), out, force=True)
     assert sorted(calls[8:]) == ["4/fixed", "4/holdfast", "5/fixed", "5/holdfast"]
-
-
-def test_without_an_example_the_report_says_so():
-    results = results_of(("pr2",))
-    document = document_of(TrialPlan(tuple(results), 12), results, example_of(results))
-    laws, paired, *_, shown = experiment.report_sections(document, results, None)
-    assert shown.text and not shown.figures
-    assert laws.tables and not paired.tables

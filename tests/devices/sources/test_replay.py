@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 
+from devices.sources.reading import Clock
 from holdfast.detector import Detector, detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import replay as module
@@ -15,22 +16,6 @@ from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
 SUFFIXES = ("parquet", "mcap")
-
-
-class Clock:
-    """A clock that only sleep and `pass_by` move."""
-
-    def __init__(self):
-        self.now = 100.0
-        self.slept = []
-
-    def monotonic(self):
-        return self.now
-
-    def sleep(self, seconds):
-        assert seconds > 0
-        self.slept.append(seconds)
-        self.now += seconds
 
 
 @pytest.fixture

@@ -6,12 +6,10 @@ import pytest
 
 import holdfast.devices.sources.serial as module
 from devices.sources.board import Board, packet, some
+from devices.sources.reading import some_of, until
 from holdfast.contact import Fault
 from holdfast.devices.sources import base, open_source
 from holdfast.errors import SourceError
-
-LIMIT = 20.0
-"""A test that hangs fails after this [s]."""
 
 
 @pytest.fixture
@@ -45,35 +43,11 @@ def started(board, text="", n_mags=5):
         source.close()
 
 
-def samples_of(source, n):
-    got = []
-    end = time.monotonic() + LIMIT
-    while len(got) < n and time.monotonic() < end:
-        arrival = source.read(0.1)
-        if arrival is not None and arrival.samples:
-            got.append(arrival)
-    assert len(got) == n
-    return got
-
-
-def wait_for(source, wanted):
-    """Arrivals up to the first that is wanted."""
-    got = []
-    end = time.monotonic() + LIMIT
-    while time.monotonic() < end:
-        arrival = source.read(0.1)
-        if arrival is not None:
-            got.append(arrival)
-            if wanted(arrival):
-                return got
-    pytest.fail(f"not among {got}")
-
-
 def test_values_are_exact(board):
     given = some(20)
     with started(board) as source:
         board.send(*map(packet, given))
-        arrivals = samples_of(source, 20)
+        arrivals = some_of(source, 20)
     np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in arrivals], given)
     times = [arrival.time for arrival in arrivals]
     assert (np.diff(times) > 0).all()
@@ -85,7 +59,7 @@ def test_samples_that_come_together_are_a_period_apart(board):
     with started(board) as source:
         time.sleep(0.2)
         board.send(b"".join(map(packet, some(10))))
-        arrivals = samples_of(source, 10)
+        arrivals = some_of(source, 10)
     assert len({arrival.received for arrival in arrivals}) == 1
     assert np.diff([arrival.time for arrival in arrivals]) == pytest.approx(0.01)
     assert arrivals[-1].time == arrivals[-1].received
@@ -95,7 +69,7 @@ def test_a_board_may_carry_several_sensors(board):
     given = some(1, 10)
     with started(board, "?mags=10&fingers=2:thumb&baud=9600", n_mags=10) as source:
         board.send(packet(given[0]))
-        (arrival,) = samples_of(source, 1)
+        (arrival,) = some_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0, :5])
     np.testing.assert_array_equal(arrival.samples["thumb"], given[0, 5:])
 
@@ -104,14 +78,14 @@ def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
     given = some(1)
     with started(board) as source:
         board.send(*map(packet, some(9, 4)))
-        arrivals = wait_for(source, lambda a: a.faults)
+        arrivals = until(source, lambda a: a.faults)
         assert not any(arrival.samples for arrival in arrivals)
         assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
         assert np.isnan(arrivals[-1].time)
         notices = [notice for arrival in arrivals for notice in arrival.notices]
         assert "mags=" in notices[-1]
         board.send(packet(given[0]))
-        (arrival,) = samples_of(source, 1)
+        (arrival,) = some_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0])
     assert arrival.faults == {}
 
@@ -121,16 +95,16 @@ def test_an_unplugged_board_is_connected_again(board, impatient):
     with started(board) as source:
         before = time.monotonic()
         board.unplug()
-        arrivals = wait_for(source, lambda a: a.notices)
+        arrivals = until(source, lambda a: a.notices)
         assert not arrivals[-1].samples
         assert arrivals[-1].notices[0].startswith("connection lost (")
         assert source.read(0.2) is None
         assert not source.ended
         board.plug()
-        arrivals = wait_for(source, lambda a: a.notices)
+        arrivals = until(source, lambda a: a.notices)
         assert arrivals[-1].notices[0].startswith("connected again after 0.")
         board.send(b"half a packet\r\n", *map(packet, given))
-        after = samples_of(source, 3)
+        after = some_of(source, 3)
     np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in after], given)
     assert after[0].time > before
 
@@ -154,11 +128,6 @@ def test_a_port_without_permission_is_an_error(board, monkeypatch):
     monkeypatch.setattr(module, "Serial", refuse)
     monkeypatch.setattr(module, "comports", list)
     with pytest.raises(SourceError, match="dialout"):
-        open_source(f"serial://{board.path}").open()
-
-
-def test_a_port_can_be_opened_once(board):
-    with started(board), pytest.raises(SourceError, match="lock"):
         open_source(f"serial://{board.path}").open()
 
 

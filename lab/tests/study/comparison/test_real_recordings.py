@@ -1,6 +1,5 @@
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -69,15 +68,3 @@ def test_a_shaken_hold_is_ranked_below_a_calm_one(made):
     areas = [row.ours for row in made["real_fingers"].rows
              if row.keys["method"] == energy and row.keys["figure"] == "AUC"]  # fmt: skip
     assert len(areas) == 4 and all(area > 0.8 for area in areas)
-
-
-def test_one_finger_has_no_whole_hand_methods(corpus):
-    one = msgspec.structs.replace(corpus, fingers=("finger1",))
-    plan = StudyPlan({"main": corpus}, real=one)
-    assert not [n for n in real_recordings.real_methods(plan, one) if METHODS[n].whole_hand]
-    assert "jl_global_logreg" in real_recordings.real_methods(plan, corpus)
-
-
-def test_without_real_recordings_there_is_nothing_to_do(corpus):
-    plan = StudyPlan({"main": corpus})
-    assert (real_recordings.tasks(plan), real_recordings.tables(plan, {})) == ([], [])

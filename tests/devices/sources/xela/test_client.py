@@ -6,6 +6,7 @@ from contextlib import ExitStack, contextmanager
 import numpy as np
 import pytest
 
+from devices.sources.reading import until
 from holdfast.devices.sources import base, open_source
 from holdfast.devices.sources.xela import client as module
 from holdfast.errors import SourceError
@@ -34,19 +35,6 @@ def quick(monkeypatch):
     monkeypatch.setattr(base, "MIN_RETRY_DELAY", 0.01)
     monkeypatch.setattr(base, "MAX_RETRY_DELAY", 0.02)
     monkeypatch.setattr(module.XelaSource, "silence_timeout", 0.05)
-
-
-def until(source, wanted):
-    """Arrivals up to the first of which `wanted` is true."""
-    arrivals = []
-    deadline = time.monotonic() + PATIENCE
-    while time.monotonic() < deadline:
-        arrival = source.read(0.05)
-        if arrival is not None:
-            arrivals.append(arrival)
-            if wanted(arrival):
-                return arrivals
-    raise AssertionError(f"not among {arrivals}")
 
 
 def says(what):

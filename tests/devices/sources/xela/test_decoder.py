@@ -13,7 +13,7 @@ from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.errors import SourceError
 from holdfast.sensors import hand
 
-from .build import NEW, PERIOD, START, WELCOME, counts, patch, sensor, text
+from .build import NEW, PERIOD, START, counts, patch, sensor, text
 
 
 def taught(first, **options):
@@ -68,12 +68,6 @@ class TestSamples:
 
 
 class TestLearning:
-    @pytest.mark.parametrize("packet", [WELCOME, '{"message": "error", "data": []}'])
-    def test_a_packet_without_samples_identifies_nothing(self, packet):
-        decoder = XelaDecoder()
-        assert not decoder.identify(packet)
-        assert decoder.sensors == {}
-
     def test_metadata_of_the_server(self):
         decoder = taught(NEW, names={1: "thumb"})
         assert list(decoder.sensors) == ["thumb"]
@@ -130,20 +124,6 @@ class TestTimes:
         assert [a.time for a in arrivals] == expected
         assert {a.received for a in arrivals[:2]} == {100.0}
         assert not any(a.faults for a in arrivals)
-
-    @pytest.mark.parametrize("jump", [-3600.0, -0.2, 3600.0])
-    @pytest.mark.parametrize("has_own", [False, True])
-    def test_time_goes_on_where_the_clock_jumps(self, jump, has_own):
-        def packet(k):
-            moved = jump if k >= 10 else 0.0
-            one = sensor(counts(16, k), time=START + k * PERIOD + moved if has_own else None)
-            return text(k, [one], time=START + k * PERIOD + moved)
-
-        arrivals = fed(taught(packet(0)), [packet(k) for k in range(20)])
-        times = np.array([a.time for a in arrivals])
-        np.testing.assert_allclose(times, START + np.arange(20) * PERIOD, atol=1e-5)
-        assert [a.faults for a in arrivals[:10] + arrivals[11:]] == [{}] * 19
-        assert arrivals[10].faults == {"finger1": (Fault.CLOCK_JUMP,)}
 
 
 class TestRefusals:
