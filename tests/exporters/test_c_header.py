@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import holdfast.kernel
 from exporters.c_detector import (
     STATES,
     WARNINGS,
@@ -32,7 +31,6 @@ pytestmark = [
 ]
 
 DRIVE = Path(__file__).with_name("drive.c")
-KERNEL = Path(holdfast.kernel.__file__).parent
 COMPILERS = {
     "gcc": ("gcc", "-std=c99"),
     "clang": ("clang", "-std=c99"),

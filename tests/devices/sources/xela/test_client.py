@@ -73,14 +73,6 @@ class TestOpening:
         ):
             open_source(f"xela://127.0.0.1:{port}").__enter__()
 
-    @pytest.mark.parametrize(
-        ("query", "message"),
-        [("values=calibrated", "has no calibrated values"), ("fingers=4:ring", "fingers= names 4")],
-    )
-    def test_it_does_not_fit_the_parameters(self, query, message):
-        with server([patch(1)]) as (port, _), pytest.raises(SourceError, match=message):
-            open_source(f"xela://127.0.0.1:{port}?{query}").__enter__()
-
 
 class TestReading:
     def test_garbage_is_refused_and_good_packets_follow(self):

@@ -68,14 +68,6 @@ class TestSamples:
 
 
 class TestLearning:
-    def test_metadata_of_the_server(self):
-        decoder = taught(NEW, names={1: "thumb"})
-        assert list(decoder.sensors) == ["thumb"]
-        assert decoder.metadata == {
-            "models": {"1": "uSPa11"},
-            "server_version": "1.8.0b_200801",
-        }
-
     @pytest.mark.parametrize("calibrated", [None, []])
     def test_without_newtons(self, calibrated):
         packet = text(1, {3: sensor(counts(16), calibrated=calibrated)})
