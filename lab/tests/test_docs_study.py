@@ -1,26 +1,15 @@
 """The figures in docs/study.md and the pages beside it are those of the published study."""
 
-import importlib.util
 import json
 import math
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from benchmark_script import ROOT, load
+
+script = load("publish_study")
 PUBLISHED = ROOT / "docs" / "study"
-
-
-def load_script():
-    spec = importlib.util.spec_from_file_location(
-        "publish_study", ROOT / "benchmarks" / "publish_study.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-script = load_script()
 
 
 @pytest.fixture(scope="module")
@@ -40,19 +29,6 @@ class TestPublished:
         templates = {f"{Path(page).name}.j2" for page in script.PAGES}
         others = {p.name for p in PUBLISHED.iterdir() if p.suffix not in (".csv", ".md")}
         assert others == {"study.json", "grip", "sources", *templates}
-
-    def test_the_links_of_the_pages_exist(self, summary):
-        for page, text in script.render(summary, PUBLISHED).items():
-            folder = (ROOT / "docs" / page).parent
-            for target in text.split("](")[1:]:
-                link = target.split(")")[0].split("#")[0]
-                if link.startswith("https://"):
-                    continue
-                path = (folder / link).resolve()
-                if path.parent == PUBLISHED and path.suffix == ".csv":
-                    assert path.stem in summary["tables"] or summary["quick"], link
-                else:
-                    assert path.exists(), link
 
 
 def test_the_readme_quotes_the_published_study(summary):

@@ -1,31 +1,18 @@
 """The figures in docs/study/grip-trials.md are those of the published run of `holdfast trial`."""
 
-import importlib.util
 import json
 import shutil
-from pathlib import Path
 
 import msgspec
 import pytest
 
+from benchmark_script import ROOT, load
 from holdfast_lab.trial.document import document_of
 from holdfast_lab.trial.plan import TrialPlan
 from trial.example_results import results_of
 
-ROOT = Path(__file__).parents[2]
+script = load("publish_trial")
 PUBLISHED = ROOT / "docs" / "study" / "grip"
-
-
-def load_script():
-    spec = importlib.util.spec_from_file_location(
-        "publish_trial", ROOT / "benchmarks" / "publish_trial.py"
-    )
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-script = load_script()
 
 
 def test_the_page_is_what_the_template_gives():
@@ -55,11 +42,6 @@ def test_the_readme_quotes_the_published_run():
     assert all(one["dropped"]["value"] < ours["dropped"]["value"] for one in rivals)
 
 
-def test_the_links_of_the_page_exist():
-    for target in script.render(PUBLISHED).split("](")[1:]:
-        assert (ROOT / "docs" / "study" / target.split(")")[0].split("#")[0]).exists(), target
-
-
 @pytest.fixture
 def runs(tmp_path):
     """Folders of invented runs with both plants; docs with the template and an older run's file."""
@@ -82,6 +64,9 @@ def runs(tmp_path):
 
 def test_runs_are_published_in_place_of_the_old_one(runs):
     docs, mild, hard = runs / "docs", runs / "mild", runs / "hard"
+    with pytest.raises(FileNotFoundError):
+        script.publish(runs / "none", docs, hard)
+    assert (docs / "grip/old.csv").exists()
     script.publish(mild, docs, hard, [(mild, mild)], {"impacts": hard})
     assert {path.name for path in (docs / "grip").iterdir()} == {
         "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "course.png",
@@ -90,14 +75,6 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     assert "trials" not in json.loads((docs / "grip/trial.json").read_text())
     script.write_page(docs)
     page = (docs / script.PAGE).read_text()
-    assert "12 trials of each plant with each law, seed 0 (mild) and 0 (hard)" in page
-    assert "| `fixed` | 63.6<br><sub>" in page
-    assert "On 11 fresh trials of the mild plant `holdfast` dropped 0.0 % of" in page
     assert "(grip/course.png)" in page and "(grip/force.png)" not in page
+    assert "| `fixed` | 63.6<br><sub>" in page
     assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
-
-
-def test_a_folder_without_a_run_changes_nothing(runs):
-    with pytest.raises(FileNotFoundError):
-        script.publish(runs / "none", runs / "docs", runs / "hard")
-    assert (runs / "docs/grip/old.csv").exists()

@@ -17,10 +17,6 @@ def test_the_parts_of_a_uri():
     assert address.text == "xela://10.0.0.2:5000/hand?values=counts&fingers=1:thumb,2:index"
 
 
-def test_what_is_encoded_is_decoded():
-    assert parse("twin:?object=a%20b+c&seed=")[1].parameters == {"object": "a b c", "seed": ""}
-
-
 @pytest.mark.parametrize(
     ("text", "host", "path"),
     [

@@ -50,33 +50,18 @@ def public_box(folder, data_folder, monkeypatch):
 
 @pytest.fixture
 def csv_recordings(folder):
-    """A function that writes grasps as CSV files, as a logger does, to a folder."""
+    """A function that writes grasps as CSV files with channels that have numbers to a folder."""
 
-    def write(name, seeds=(0, 1, 2), fingers=("thumb", "index"), *, plain=False):
+    def write(name):
         (folder / name).mkdir()
-        for seed in seeds:
-            recording = synthetic_recording(f"grasp{seed}", seed, fingers)
-            write_csv(recording, folder / name / f"grasp{seed}.csv", plain=plain)
+        for seed in (0, 1, 2):
+            (module,) = synthetic_recording(f"grasp{seed}", seed, ("thumb",)).modules.values()
+            columns = np.c_[module.times, module.readings.reshape(module.n_samples, -1)]
+            names = ["time", *(f"s{k}" for k in range(columns.shape[1] - 1))]
+            np.savetxt(
+                folder / name / f"grasp{seed}.csv", columns, delimiter=",",
+                fmt=["%.6f"] + ["%d"] * (columns.shape[1] - 1),
+                header=",".join(names), comments="",
+            )  # fmt: skip
 
     return write
-
-
-def write_csv(recording, path, *, plain):
-    """Write a recording; without the names of sensors, and channels that have numbers, if plain."""
-    modules = recording.modules
-    first = next(iter(modules.values()))
-    names = [
-        f"{module}.t{taxel:02}.{axis}"
-        for module, one in modules.items()
-        for taxel in range(1, one.sensor.n_taxels + 1)
-        for axis in "xyz"
-    ]
-    columns = [first.times[:, None]]
-    columns += [one.readings.reshape(one.n_samples, -1) for one in modules.values()]
-    header = [f"# sensor: {module}={one.sensor.name}" for module, one in modules.items()]
-    if plain:
-        header, names = [], [f"s{k}" for k in range(len(names))]
-    np.savetxt(
-        path, np.hstack(columns), fmt=["%.6f"] + ["%d"] * len(names), delimiter=",",
-        header="\n".join([*header, ",".join(["time", *names])]), comments="",
-    )  # fmt: skip

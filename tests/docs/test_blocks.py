@@ -9,25 +9,16 @@ def write(folder, text):
     return path
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
-        ("holdfast info none.parquet", "page.md:1: 'holdfast info none.parquet' ended with 2"),
-        ("false | cat", "page.md:1: 'false | cat'"),
-    ],
-)
-def test_a_command_that_fails(folder, capsys, line, message):
-    with pytest.raises(AssertionError, match=message):
-        blocks.run_page(write(folder, f"```sh\n{line}\n```\n"))
+def test_a_command_that_fails(folder):
+    with pytest.raises(AssertionError, match=r"page\.md:1: 'holdfast info none\.parquet'"):
+        blocks.run_page(write(folder, "```sh\nholdfast info none.parquet\n```\n"))
 
 
 def test_options_of_commands_that_do_not_run_must_exist(folder):
-    page = "<!-- not run: why -->\n```sh\n{}\n```\n"
-    assert blocks.run_page(write(folder, page.format("uv run holdfast demo --speed 0 | cat"))) == 0
-    with pytest.raises(Exception, match="No such option: --sped"):
-        blocks.run_page(write(folder, page.format("holdfast demo --sped 0")))
-    with pytest.raises(Exception, match="No such command 'demonstrate'"):
-        blocks.run_page(write(folder, page.format("holdfast demonstrate")))
+    with pytest.raises(Exception, match="--sped"):
+        blocks.run_page(
+            write(folder, "<!-- not run: why -->\n```sh\nholdfast demo --sped 0\n```\n")
+        )
 
 
 @pytest.mark.parametrize(

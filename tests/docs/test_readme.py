@@ -35,7 +35,7 @@ def test_the_demo(folder, short_demo):
 
 
 def test_files_of_ones_own_and_code(folder, csv_recordings):
-    csv_recordings("my-data", fingers=("thumb",), plain=True)
+    csv_recordings("my-data")
     assert blocks.run_page(README, {}, FILES) == 1
     assert (folder / "model.json").exists()
     save_recording(synthetic_recording("live", 0), folder / "live.parquet")

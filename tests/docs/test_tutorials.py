@@ -78,10 +78,6 @@ def test_a_figure(folder, public_box):
 
 def test_from_the_registry_to_a_decision(folder, public_box, capsys):
     """The three commands of docs/datasets.md."""
-    (block,) = [b for b in blocks.blocks_of(DOCS / "datasets.md") if b.language == "sh"]
-    assert [line.split()[1] for line in blocks.lines_of(block.text)] == [
-        "datasets", "info", "detect"
-    ]  # fmt: skip
     assert blocks.run_page(DOCS / "datasets.md", public_box) == 1
     out = capsys.readouterr().out
     assert re.search(r"^data_sample_2022-02-22-08-10-01 +1.34 +1.75 +1.68$", out, re.M)

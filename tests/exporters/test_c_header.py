@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import holdfast.kernel
 from exporters.c_detector import (
     STATES,
     WARNINGS,
@@ -23,7 +22,6 @@ from holdfast.contact import ContactState, Fault
 from holdfast.detector import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import header_of
-from holdfast.exporters.c_header import structs_of
 from holdfast.io.importers import import_recordings
 from holdfast.synthetic import synthetic_recording
 
@@ -33,7 +31,6 @@ pytestmark = [
 ]
 
 DRIVE = Path(__file__).with_name("drive.c")
-KERNEL = Path(holdfast.kernel.__file__).parent
 COMPILERS = {
     "gcc": ("gcc", "-std=c99"),
     "clang": ("clang", "-std=c99"),
@@ -258,17 +255,8 @@ def test_an_update_may_receive_constant_and_other_arrays(tmp_path):
         "holdfast_update(&d, 0.0, open, &e); holdfast_update(&d, 1.0, fixed, &e);\n"
         "return e.finger[HOLDFAST_FINGER_A].state == HOLDFAST_UNKNOWN ? 0 : 1; }\n"
     )
-    words = [
-        "cc",
-        "-std=c99",
-        "-O2",
-        *WARNINGS,
-        tmp_path / "main.c",
-        "-o",
-        tmp_path / "main",
-        "-lm",
-    ]
-    subprocess.run(words, check=True)
+    words = ["cc", "-std=c99", "-O2", *WARNINGS, tmp_path / "main.c", "-lm", "-o"]
+    subprocess.run([*words, tmp_path / "main"], check=True)
     assert subprocess.run([tmp_path / "main"], check=False).returncode == 0
 
 
@@ -280,20 +268,6 @@ def test_the_header_says_what_it_was_made_of():
     assert re.search(r"#define HOLDFAST_HEADER_ID 0x[0-9a-f]{8}u", text)
     assert "@" not in text
     assert header_of(model, HAND, 150.0).text == text
-
-
-def test_the_kernel_of_the_header_is_that_of_the_files():
-    text = header_of(paper(), HAND, 150.0).text
-    includes = (KERNEL / "kernel.c").read_text() + (KERNEL / "holdfast.c").read_text()
-    for name in re.findall(r'#include "(.*)"', includes):
-        for part in re.split(r'#include ".*"', (KERNEL / name).read_text()):
-            assert part.strip() in text, name
-    assert '#include "' not in text
-
-
-def test_a_field_that_is_not_understood_is_named():
-    with pytest.raises(ValueError, match="'int a, b'"):
-        structs_of("typedef struct { int a, b; } holdfast_x;")
 
 
 def test_what_cannot_be_exported_is_named():
@@ -308,4 +282,4 @@ def test_fast_math_is_an_error(tmp_path):
     for flag in ("-ffast-math", "-ffinite-math-only"):
         shown = subprocess.run([*command, flag], check=False, capture_output=True, text=True)
         assert shown.returncode
-        assert "compile without -ffast-math or /fp:fast" in shown.stderr
+        assert "-ffast-math" in shown.stderr

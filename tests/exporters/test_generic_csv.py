@@ -92,15 +92,6 @@ def test_a_sensor_of_its_own_is_a_file_beside_the_table(tmp_path):
     assert not (tmp_path / "more").exists()
 
 
-def test_what_a_table_cannot_hold_is_named(tmp_path):
-    empty = Tactile(sensor("anyskin"), [], np.empty((0, 5, 3)))
-    recording = Recording(
-        "a", {"b": tactile(), "c": empty}, {"object": "can"}, markers=((1.0, "x"),)
-    )
-    written = export([recording], tmp_path / "out")
-    assert written.left_out == ["metadata", "markers", "modules without samples"]
-
-
 @pytest.mark.parametrize("name", ["=1+1", "a,b", "a=b", " a", "a ", 'a"b', "a\nb", "@a", ""])
 def test_a_name_that_no_header_holds_is_refused(tmp_path, name):
     with pytest.raises(RecordingError, match="columns"):
@@ -126,6 +117,3 @@ def test_no_file_is_overwritten(tmp_path):
     with pytest.raises(OutputError, match=r"a\.csv exists already"):
         export([Recording(name, {"b": tactile()}) for name in ("0", "a")], tmp_path / "out")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.csv"]
-    (tmp_path / "file").write_text("mine")
-    with pytest.raises(OutputError, match="a folder"):
-        export([Recording("a", {"b": tactile()})], tmp_path / "file")

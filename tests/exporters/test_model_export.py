@@ -7,7 +7,7 @@ import pytest
 import holdfast
 from detector.build import model as small_model
 from exporters.models import HAND, PATCH, TIP, built_in, paper
-from holdfast.errors import ModelError, OutputError
+from holdfast.errors import ModelError
 from holdfast.exporters import export, fingers_of_sensor
 from holdfast.synthetic import synthetic_recording
 
@@ -19,11 +19,6 @@ def test_a_recording_gives_the_fingers(tmp_path):
     assert written.fingers == ("ring", "thumb")
     assert "HOLDFAST_FINGER_RING = 0" in text and "HOLDFAST_FIRST_TAXEL_THUMB = 30" in text
     assert written.size == len(text.encode())
-
-
-def test_a_model_that_names_its_fingers_needs_nothing_else(tmp_path):
-    written = export(small_model(), tmp_path / "model.h")
-    assert written.fingers == ("thumb", "index")
 
 
 def test_contact_at_the_start_is_in_the_metadata(tmp_path):
@@ -61,16 +56,6 @@ def test_what_does_not_fit_is_refused(tmp_path):
     with pytest.raises(ModelError, match=r"thumb \(uskin-4x4\)"):
         export(built_in("twin"), out, fingers={"thumb": PATCH})
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_file_is_not_replaced_without_force(tmp_path):
-    out = tmp_path / "model.h"
-    out.write_text("mine")
-    with pytest.raises(OutputError, match="exists already"):
-        export(paper(), out, fingers=HAND)
-    assert out.read_text() == "mine"
-    export(paper(), out, fingers=HAND, force=True)
-    assert out.read_text() != "mine"
 
 
 def test_names_of_fingers_that_are_no_words_are_made_so(tmp_path):

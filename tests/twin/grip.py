@@ -8,11 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact, constants_of, new_contact
-from holdfast.twin.objects import GraspObject, solid
+from holdfast.twin.objects import GraspObject, object_named, solid
+from holdfast.twin.skin import COUPLED
 from holdfast.twin.steps import probe, touch
 from holdfast.twin.surface import Surface, curved_fingertip
+from holdfast.twin.world import fingertip_of
 
 GRAVITY = 9.81
+SURFACE = fingertip_of(coupled=True)
+"""The skin whose nodes are coupled."""
 MIDDLE = 0.012  # distal coordinate of the pad's middle [m]
 
 
@@ -86,3 +90,10 @@ def place(body: Array, surface: Surface, shape: Array, angle: float, depth: floa
         deepest = min(probe(shape, *point)[0] for point in points)
         near, far = (middle, far) if deepest < -depth else (near, middle)
     body[:3], body[3:12] = origin, rotation.ravel()
+
+
+def coupled_grip(name: str, depth: float = 2e-3, dt: float = 1 / 1050) -> Grip:
+    item = object_named(name)
+    grip = Grip(item, depth, dt, surface=SURFACE)
+    grip.constants = constants_of(SURFACE, item, COUPLED)
+    return grip

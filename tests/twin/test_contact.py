@@ -13,7 +13,7 @@ from holdfast.twin.skin import Skin
 from holdfast.twin.steps import probe, touch
 from holdfast.twin.surface import Surface, curved_fingertip
 
-from .grip import GRAVITY, Grip
+from .grip import GRAVITY, Grip, coupled_grip
 from .naive_contact import NaiveFinger
 
 pytestmark = pytest.mark.slow
@@ -169,9 +169,12 @@ def test_a_fingertip_that_leaves_has_no_state() -> None:
         assert not part.any()
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", [*NAMES, "coupled can"])
 def test_held_at_rest_without_creep(name: str) -> None:
-    grip = Grip(object_named(name), depth=2.2e-3)
+    if name == "coupled can":
+        grip = coupled_grip("can", 2.5e-3)
+    else:
+        grip = Grip(object_named(name), depth=2.2e-3)
     grip.settle(2.0)
     before, slip = grip.object_body[:3].copy(), []
     for _ in range(2000):

@@ -102,6 +102,3 @@ class TestGlitches:
         np.testing.assert_allclose(got[4:8], PROPORTIONAL[4:8] * 0.05, atol=TORQUE_STEP)
         assert not got[:4].any()
         assert not got[8:].any()
-
-    def test_after_the_end_of_the_drawn_errors_the_last_row_holds(self, plain):
-        torques(plain, 0.0, 0.01, tick=10**6)

@@ -4,18 +4,17 @@ import numpy as np
 import pytest
 
 from holdfast.sensors.types import Array
-from holdfast.twin.contact import constants_of, nearness_of
+from holdfast.twin.contact import nearness_of
 from holdfast.twin.objects import object_named
 from holdfast.twin.skin import COUPLED, COUPLED_PITCH
 from holdfast.twin.steps import MAX_COUPLED, probe, relief, touch
 from holdfast.twin.world import fingertip_of
 
 from . import mindlin
-from .grip import GRAVITY, Grip
+from .grip import SURFACE, coupled_grip
 
 pytestmark = pytest.mark.slow
 
-SURFACE = fingertip_of(coupled=True)
 PLACEMENTS = 6
 
 
@@ -60,13 +59,6 @@ def test_cattaneo_and_mindlin_there_and_back(errors: dict[str, Array]) -> None:
             assert abs(values.mean()) < 3, name
         n_compared += "stick radius" in name
     assert n_compared == 8
-
-
-def coupled_grip(name: str, depth: float = 2e-3, dt: float = 1 / 1050) -> Grip:
-    item = object_named(name)
-    grip = Grip(item, depth, dt, surface=SURFACE)
-    grip.constants = constants_of(SURFACE, item, COUPLED)
-    return grip
 
 
 @pytest.mark.parametrize("name", ["can", "box"])
@@ -117,17 +109,6 @@ def test_momentum_is_kept_and_coulomb_is_never_passed() -> None:
             assert pressed.min() >= -1e-12
             assert (friction <= mu * pressed * (1 + 1e-9) + 1e-12).all()
     assert grip.state.slip_speed.max() > 1e-5
-
-
-def test_held_at_rest_without_creep() -> None:
-    grip = coupled_grip("can", 2.5e-3)
-    grip.settle(2.0)
-    before = grip.object_body[:3].copy()
-    grip.settle(1.0)
-    assert grip.state.slip_speed.max() < 1e-6
-    assert np.linalg.norm(grip.object_body[:3] - before) < 1e-6
-    weight = [0.0, 0.0, GRAVITY * grip.mass]
-    np.testing.assert_allclose(grip.state.wrench[:3], weight, atol=1e-3)
 
 
 def test_a_fingertip_that_leaves_has_no_state_and_comes_back() -> None:

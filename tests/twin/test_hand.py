@@ -76,16 +76,6 @@ def test_joints_are_numbered_as_the_driver_does_and_keep_the_vendors_limits(hand
     ])  # fmt: skip
 
 
-def test_joints_stop_at_their_limits(hand):
-    hand.data.qfrc_applied[:N_JOINTS] = 0.7 * np.where(np.arange(N_JOINTS) % 2, 1, -1)
-    for _ in range(1000):
-        mujoco.mj_step(hand.model, hand.data)
-    low, high = hand.limits().T
-    over = np.maximum(low - hand.data.qpos[:N_JOINTS], hand.data.qpos[:N_JOINTS] - high)
-    assert over.max() < 0.05
-    assert np.abs(hand.data.qvel[:N_JOINTS]).max() < 0.01
-
-
 @pytest.mark.parametrize("seed", range(5))
 def test_velocities_are_those_that_mujoco_gives(hand, seed):
     bodies = moving(hand, seed)

@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.contact import Fault
-from holdfast.detector import detect
-from holdfast.live.module_checks import HoldDrift, ModuleComparison
-from holdfast.model import Model
+from holdfast.live.module_checks import ModuleComparison
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin.magnetic_faults import STILL_SECONDS_AT_START, MagneticFaults
 
@@ -58,26 +55,6 @@ def test_a_field_is_common_to_all_taxels(grasp):
         change = counts - np.asarray(grasp.modules[name].readings, dtype=float)
         turned = np.einsum("ijk,nik->nij", grasp.modules[name].sensor.rotations, change)
         assert np.abs(turned - field[:, None]).max() < 1  # rounding
-
-
-def test_zeros_are_invalid_readings(grasp):
-    share, bit = 0.03, list(Fault).index(Fault.INVALID)
-    estimates = detect(Model.load("builtin:any"), recorded(grasp, spoiled(grasp, zero_share=share)))
-    for trace in estimates.fingers.values():
-        assert (trace.faults >> bit & 1).mean() == pytest.approx(share, rel=0.3)
-
-
-def test_a_drift_shows_in_a_hold(grasp):
-    """With 30 taxels of random sign: 3600 counts an hour are 60 a minute in each of them."""
-    times = np.arange(0, 60, 0.1)
-    still = {"thumb": np.full((600, 30, 3), 33_000, dtype=np.uint16)}
-    thumb = grasp.modules["thumb"].sensor
-    rest = {"thumb": np.full((30, 3), 32_000.0)}
-    counts = MagneticFaults(drift=36_000).apply({"thumb": thumb}, still, times, rest, 5)["thumb"]
-    drift = HoldDrift()
-    for time, sample in zip(times, counts, strict=True):
-        drift.update(np.einsum("ijk,ik->j", thumb.rotations, sample - rest["thumb"]), time)
-    assert drift.seconds > 50 and abs(drift.per_minute) > 100
 
 
 def test_cross_talk_is_found():

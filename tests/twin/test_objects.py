@@ -1,5 +1,3 @@
-import copy
-import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +12,6 @@ from holdfast.twin.objects import (
     GraspObject,
     distance_to,
     load_objects,
-    object_named,
     solid,
 )
 from holdfast.twin.steps import MAX_RELIEF, probe, relief
@@ -188,16 +185,6 @@ def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
     assert -cone.foot[2] == pytest.approx(height, rel=0.01)
 
 
-def test_objects_can_be_pickled_and_copied() -> None:
-    for again in (
-        pickle.loads(pickle.dumps(object_named("can"))),
-        copy.deepcopy(object_named("can")),
-    ):
-        assert again.name == "can"
-        assert again.inertia.tobytes() == object_named("can").inertia.tobytes()
-        assert not again.inertia.flags.writeable
-
-
 def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
     path = tmp_path / "more.toml"
     path.write_text(BUILT_IN_OBJECTS.read_text("utf-8") + LINE, "utf-8")
@@ -206,11 +193,6 @@ def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
     assert (objects["mug"].radius, objects["mug"].half_height) == (0.035, 0.05)
     assert objects["mug"].yaw == 0.1
     assert objects["can"].inertia.tobytes() == OBJECTS["can"].inertia.tobytes()
-
-
-def test_an_unknown_object() -> None:
-    with pytest.raises(ValueError, match="'cup'"):
-        object_named("cup")
 
 
 @pytest.mark.parametrize(

@@ -65,8 +65,3 @@ def test_a_tool_knocks_once_in_each_part_of_the_time(monkeypatch):
     assert recording.metadata["case"] == "1"
     starts = [impact.start for impact in plans[-1].impacts]
     assert [int((start - scripted.FIRST_ACTION) / 2.0) for start in starts] == [0, 1, 2]
-
-
-def test_an_unknown_action_is_refused():
-    with pytest.raises(ValueError, match="'juggle'"):
-        perform(CAN, "juggle", 1, 5.0)

@@ -7,10 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.features import fingertip_force
-from holdfast.twin import control, hand, simulation
+from holdfast.twin import hand, simulation
 from holdfast.twin.objects import OTHER_OBJECTS, object_named
-from holdfast.twin.profile import profile, profiles
-from holdfast.twin.protocol import MIN_TOUCH_LOAD
+from holdfast.twin.profile import profile
 from holdfast.twin.simulation import Grasp, simulate
 from holdfast.twin.uskin_readout import UskinParameters
 
@@ -148,28 +147,13 @@ class TestTruth:
             given = force[k : k + 299].sum(axis=0) / 150
             np.testing.assert_allclose(gained, given, atol=0.02)
 
-    def test_a_disturbance_lasts_from_its_first_touch_to_its_last(self, pushed):
-        phase = pushed.truth.hand["phase"]
-        force = np.linalg.norm(pushed.truth.hand["outside_force"], axis=1)
-        disturbed = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING]).astype(int)
-        edges = np.diff(np.concatenate([[0], disturbed, [0]]))
-        starts, ends = np.flatnonzero(edges > 0), np.flatnonzero(edges < 0)
-        assert len(starts) >= 2
-        assert (force[starts] > MIN_TOUCH_LOAD).all()
-        assert (force[ends - 1] > MIN_TOUCH_LOAD).all()
-        assert (force[starts - 1] <= MIN_TOUCH_LOAD).all()
-        assert (force[ends] <= MIN_TOUCH_LOAD).all()
-
 
 class TestRecording:
     def test_metadata(self, held, dropped):
         assert held.metadata.keys() >= {
             "object", "object_mass", "case", "repeat", "profile", "seed", "hand", "source"
         }  # fmt: skip
-        assert held.name == "can-case1-1"
-        assert (held.metadata["case"], held.metadata["planned_case"]) == ("1", 1)
-        assert held.metadata["lost_at"] is None
-        assert held.metadata["source"] == "twin"
+        assert (held.name, held.metadata["lost_at"]) == ("can-case1-1", None)
 
     def test_a_failed_grasp_has_the_case_failed(self, dropped):
         assert dropped.name == "bottle-case1-1-failed1"
@@ -186,27 +170,6 @@ class TestRecording:
             )
             assert Cause.LOST in {x.cause for x in module.labels}
         assert dropped.truth.hand["object_pose"][-1, 2] < -0.2  # it fell, and out of the picture
-
-    def test_phases_and_labels_of_a_held_object(self, held):
-        for module in held.modules.values():
-            assert (module.label_states > 0).all()
-            causes = [label.cause for label in module.labels]
-            assert causes[0] is None
-            assert Cause.CLOSING in causes
-            assert Cause.RELEASED in causes
-            assert Cause.LOST not in causes
-            assert (module.label_states[quiet(held)] == ContactState.STABLE.code).all()
-
-    def test_a_disturbed_object_is_labelled_so(self, pushed):
-        n_pushed = 0
-        phase = pushed.truth.hand["phase"]
-        for module in pushed.modules.values():
-            disturbed = np.isin(phase, [Phase.DISTURBED, Phase.SLIPPING])
-            assert disturbed.any()
-            assert (module.label_states[disturbed] == ContactState.UNSTABLE.code).all()
-            causes = [label.cause for label in module.labels]
-            n_pushed += causes.count(Cause.DISTURBANCE) + causes.count(Cause.SLIP)
-        assert n_pushed >= 4
 
 
 class TestSeeds:
@@ -235,30 +198,7 @@ class TestSeeds:
         assert seen == list(held.truth.hand["phase"])
 
 
-@pytest.mark.parametrize(
-    ("grasp", "message"),
-    [
-        (Grasp("cup", 1, 1), "'cup'"),
-        (Grasp("can", 3, 1), "3 given"),
-        (Grasp("can", 1, 1, "rough"), "'rough'"),
-    ],
-)
-def test_an_unknown_object_case_or_profile_is_refused(grasp, message):
-    with pytest.raises(ValueError, match=message):
-        simulate(grasp)
-
-
 class TestLongHold:
-    def test_glitches_are_drawn_for_all_of_it_and_as_before_for_the_others(self):
-        period = control.STEPS_PER_CONTROL * hand.TIMESTEP
-        chosen = profile("long-hold")
-        errors = simulation._world(Grasp("can", 2, 1), chosen).controller.errors
-        assert len(errors) * period > chosen.hold + 20.0
-        assert errors[round(250.0 / period) :].any()
-        for name in (name for name in profiles() if name != "long-hold"):
-            errors = simulation._world(Grasp("can", 2, 1), profile(name)).controller.errors
-            assert len(errors) == int(60.0 / period) + 1 or profile(name).hold > 35.0
-
     def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):
         chosen = msgspec.structs.replace(profile("long-hold"), idle=(0.7, 0.8), hold=6.0)
         calm, shaken = (
@@ -288,29 +228,9 @@ class TestMovedByAHand:
 
 
 class TestGlitches:
-    def test_are_labelled_with_their_cause_and_followed_by_stable(self):
-        shaken = made(Grasp("can", 1, 1), MOVED, glitches=0.5)
-        glitched = shaken.truth.hand["set_point_error"] > 0
-        held = shaken.truth.hand["phase"] == "locked"
-        states = label_causes(shaken, "index")
-        alone = np.linalg.norm(shaken.truth.hand["outside_force"], axis=1) < 0.05
-        assert (glitched & held & alone).any()
-        assert set(states[glitched & held & alone]) <= {"glitch", "slip"}
-        assert (states == "glitch").any()
-
     def test_a_grasp_can_have_its_own_rate_of_glitches(self, held):
         none = made(replace(Grasp("can", 1, 1), glitch_rate=0.0), SHORT, glitches=0.5)
         assert none.metadata["glitch_rate"] == 0.0
         assert not none.truth.hand["set_point_error"].any()
         wanted = held.modules["thumb"].readings
         np.testing.assert_array_equal(none.modules["thumb"].readings, wanted)
-
-
-def label_causes(recording, finger):
-    """Return the cause of the label of each sample, "" without one."""
-    module = recording.modules[finger]
-    causes = np.full(len(module.times), "", dtype="U12")
-    for label in module.labels:
-        inside = (module.times >= label.start) & (module.times < label.end)
-        causes[inside] = label.cause or ""
-    return causes

@@ -198,12 +198,6 @@ def test_noise_is_that_asked_for_rounding_included(noise):
     assert np.sqrt((steps**2).mean()) == pytest.approx(noise, rel=0.01)  # white
 
 
-def test_less_noise_than_rounding_is_rounding_only():
-    quiet = tip(replace(REAL, noise_counts=0.2)).counts(np.zeros((5, 30, 3)), np.arange(5.0))
-    still = tip(replace(REAL, noise_counts=0.0)).counts(np.zeros((5, 30, 3)), np.arange(5.0))
-    np.testing.assert_array_equal(quiet, still)
-
-
 def test_baselines_are_like_those_of_real_packets():
     """Of the two hands' 368 taxels: x, y 32725..32806 +- 227..297, z 35879, 36535 +- 715, 793."""
     rest = np.concatenate([tip(seed=seed).taxels.baseline for seed in range(40)])
@@ -324,15 +318,6 @@ def test_noise_wanders_with_the_root_of_time_whether_averaged_or_not(n_averaged)
     np.testing.assert_allclose(sizes[4:], expected[4:], rtol=0.05)
 
 
-def test_colour_draws_nothing_from_the_generator_of_other_noise():
-    """Warming, and all that is drawn after the readings, stay as they are."""
-    generators = [np.random.default_rng(1) for _ in range(2)]
-    for parameters, generator in zip((REAL, COLOURED), generators, strict=True):
-        skin = Uskin(parameters, TIP, SKIN.nodes, np.random.default_rng(0))
-        skin.counts(np.zeros((50, 30, 3)), np.arange(50) / RATE, generator)
-    assert generators[0].random() == generators[1].random()
-
-
 @pytest.mark.parametrize("step", [1, 7])
 def test_readings_are_multiples_of_the_step(step):
     counts = tip(replace(REAL, noise_counts=9.0, step=step)).counts(
@@ -395,11 +380,6 @@ def test_a_sensor_keeps_its_taxels_from_run_to_run_but_not_its_noise():
     assert np.abs(one.astype(float) - other).max() < 12
 
 
-def test_no_samples_no_counts():
-    assert tip().counts(np.zeros((0, 30, 3)), []).shape == (0, 30, 3)
-    assert tip().taxel_forces(np.zeros((0, len(SKIN.nodes), 3))).shape == (0, 30, 3)
-
-
 @pytest.mark.parametrize(
     ("forces", "times", "message"),
     [
@@ -413,18 +393,6 @@ def test_no_samples_no_counts():
 def test_bad_samples_are_refused(forces, times, message):
     with pytest.raises(ValueError, match=message):
         tip().counts(forces, times)
-
-
-def test_time_that_runs_back_between_pieces_is_refused():
-    run = tip().readout()
-    run.counts(np.zeros((1, 30, 3)), [1.0])
-    with pytest.raises(ValueError, match="increasing times expected"):
-        run.counts(np.zeros((1, 30, 3)), [1.0])
-
-
-def test_node_forces_of_another_skin_are_refused():
-    with pytest.raises(ValueError, match=r"\(1, 7, 3\)"):
-        tip().taxel_forces(np.zeros((1, 7, 3)))
 
 
 @pytest.mark.parametrize(
@@ -492,13 +460,6 @@ def test_share_of_repeats_and_jitter_are_those_asked_for(share):
     )
     assert (np.diff(sent) == 0).mean() == pytest.approx(share, abs=0.01)
     assert (stamps - np.arange(n) / RATE).std() == pytest.approx(1e-3, rel=0.15)
-
-
-@pytest.mark.parametrize("n", [0, 1])
-def test_server_effects_on_next_to_nothing(n):
-    times, sent = with_server_effects(np.zeros(n), np.ones((n, 2)), np.random.default_rng(0))
-    assert times.shape == (n,)
-    assert sent.shape == (n, 2)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from holdfast.errors import OutputError, RecordingError
 from holdfast.io.foreign import end_children, read_stickers
 from holdfast.recordings import Recording, Truth
 from holdfast.synthetic import synthetic_recording
@@ -59,14 +58,3 @@ def test_motion_is_that_of_the_truth_on_a_clock_of_its_own(film):
     pixels = 0.006 * (share - share[0]) * CAMERA.focal_length / (CAMERA.distance - 0.033)
     assert np.abs(np.abs(moved) - pixels * np.cos(CAMERA.turn[0])).max() < 0.5
     assert np.ptp(places[3][:, :, 2], axis=0).max() < 0.1
-
-
-def test_a_recording_without_poses(tmp_path):
-    made = synthetic_recording("made", seed=0)
-    with pytest.raises(RecordingError, match="no poses"):
-        film_stickers(made, tmp_path / "made.mp4")
-
-
-def test_a_folder_that_does_not_exist(tmp_path):
-    with pytest.raises(OutputError, match=r"can-1\.mp4"):
-        film_stickers(grasp(), tmp_path / "none" / "can-1.mp4", CAMERA)

@@ -59,15 +59,6 @@ def test_the_operator_holds_the_object_before_an_open_hand():
     assert not made.loads.any()
 
 
-def test_without_operator_or_fingers_it_falls_freely():
-    made = world()
-    start = made.bodies[-1, 2]
-    run(made, 0.2, hold=0.0)
-    assert made.bodies[-1, 14] == pytest.approx(-GRAVITY * 0.2, rel=0.01)
-    assert start - made.bodies[-1, 2] == pytest.approx(0.5 * GRAVITY * 0.2**2, rel=0.02)
-    assert not made.outside.any()
-
-
 def test_a_fallen_object_stays_below_the_picture():
     made = run(world(), 1.0, hold=0.0)
     low = made.bodies[-1, 2]

@@ -1,18 +1,11 @@
-import io
-
 import numpy as np
 import pytest
 
+from figures.drawing import drawn
 from holdfast.plots.style import PAPER
 from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_lines, draw_reliability
 
 X = np.array([4.0, 8.0, 14.0])
-
-
-def drawn(figure):
-    """Drawing causes most warnings; they are errors here."""
-    figure.savefig(io.BytesIO(), format="png", dpi=50)
-    return figure
 
 
 def test_lines_have_bands_and_the_paper_is_black():
@@ -32,10 +25,6 @@ def test_lines_have_bands_and_the_paper_is_black():
     assert axes.lines[1].get_color() == "black"
     (band,) = axes.collections
     assert {91.0, 93.0} <= set(band.get_paths()[0].vertices[:, 1])
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["4", "8", "14"]
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("N_w", "Acc [%]")
-    texts = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert texts == ["ours", "b", PAPER]
 
 
 def test_a_rate_of_zero_false_alarms_is_marked_zero():
@@ -50,17 +39,9 @@ def test_a_rate_of_zero_false_alarms_is_marked_zero():
     assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (0.5, 40.0)
 
 
-def test_alarms_without_curves():
-    drawn(draw_alarms({}))
-    drawn(draw_alarms({"missed": {}}))
-    drawn(draw_alarms({"missed": {"a": PlottedCurve(np.zeros(2), np.zeros(2))}}))
-
-
 @pytest.mark.slow
 def test_reliability_shows_bins_and_sample_counts():
     table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])
     figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))
     np.testing.assert_array_equal(figure.axes[0].lines[1].get_ydata(), table[:, 1])
     np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), [75.0, 25.0])
-    texts = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    assert texts == ["a, Brier 0.1", "b"]

@@ -1,13 +1,11 @@
-import io
-
 import numpy as np
 import pytest
 from matplotlib.colors import to_hex
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
+from figures.drawing import drawn
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
-    PHASE_COLOURS,
     STATE_COLOURS,
 )
 from holdfast.plots.time_series import FingerSeries
@@ -31,12 +29,6 @@ def series(n=200, seed=0, **options):
     return made._replace(**options)
 
 
-def drawn(figure):
-    """Drawing causes most warnings; they are errors here."""
-    figure.savefig(io.BytesIO(), format="png", dpi=50)
-    return figure
-
-
 def lines(axes):
     return {to_hex(line.get_color()): line.get_ydata() for line in axes.lines}
 
@@ -51,54 +43,6 @@ def strips(axes):
             colour = to_hex(bars.get_facecolor()[0])
             found[names[round((low + high) / 2)]].add((round(left, 6), round(right, 6), colour))
     return found
-
-
-def test_forces_are_drawn_unchanged():
-    given = series()
-    axes = drawn(draw_forces(given)).axes[0]
-    for column, name in enumerate(("F_x", "F_y", "F_z")):
-        values = lines(axes)[COMPONENT_COLOURS[name].lower()]
-        np.testing.assert_array_equal(values, given.force[:, column])
-    assert axes.get_ylabel() == "fingertip force [counts]"
-    assert axes.get_xlabel() == "time [s]"
-
-
-def test_phases_are_shaded_until_the_next_phase():
-    axes = drawn(draw_forces(series())).axes[0]
-    spans = [
-        (patch.get_x(), patch.get_x() + patch.get_width(), to_hex(patch.get_facecolor()))
-        for patch in axes.patches
-    ]
-    expected = [(0, 0.5, Phase.FREE), (0.5, 1, Phase.CLOSING), (1, 1.5, Phase.LOCKED)]
-    assert len(spans) == 3
-    for span, (start, end, phase) in zip(spans, expected, strict=True):
-        assert span[:2] == pytest.approx((start, end))
-        assert span[2] == PHASE_COLOURS[phase]
-    assert [text.get_text() for text in axes.texts] == ["free", "closing", "locked"]
-
-
-def test_a_narrow_phase_is_named_only_in_the_legend():
-    phases = np.array(["locked"] * 195 + ["slipping"] * 5)
-    figure = drawn(draw_forces(series(phases=phases)))
-    assert [text.get_text() for text in figure.axes[0].texts] == ["locked"]
-    texts = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
-    assert {"locked", "slipping"} <= texts
-
-
-def test_features_are_drawn_unchanged():
-    given = series(unit="N")
-    forces, amplitude, sigma, labels = drawn(draw_features(given)).axes
-    np.testing.assert_array_equal(amplitude.lines[0].get_ydata(), given.amplitude)
-    np.testing.assert_array_equal(amplitude.lines[1].get_ydata(), given.mean)
-    np.testing.assert_array_equal(sigma.lines[0].get_ydata(), given.sigma)
-    assert forces.get_ylabel() == "$F_{tip}$ [N]"
-    assert strips(labels) == {
-        "label": {
-            (0.0, 0.5, STATE_COLOURS[NO_CONTACT]),
-            (0.5, 1.0, STATE_COLOURS[UNSTABLE]),
-            (1.0, 1.5, STATE_COLOURS[STABLE]),
-        }
-    }
 
 
 def test_predictions_are_strips_with_their_accuracy():
@@ -122,25 +66,11 @@ def test_predictions_are_strips_with_their_accuracy():
     assert axes.get_xlim() == (0.2, 1.2)
 
 
-def test_sigma_with_high_peaks_has_a_logarithmic_axis():
-    given = series()
-    peak = given.sigma.copy()
-    peak[100] = 1000.0
-    assert drawn(draw_features(given)).axes[2].get_yscale() == "linear"
-    assert drawn(draw_features(given._replace(sigma=peak))).axes[2].get_yscale() == "log"
-
-
 @pytest.mark.parametrize("n", [0, 4])
 def test_a_series_of_few_samples_is_drawn(n):
     given = series(n)
     for figure in (draw_forces(given), draw_features(given), draw_experiment(given, {}, {})):
         drawn(figure)
-
-
-def test_a_series_without_labels_and_phases_is_drawn():
-    given = series(labels=np.zeros(200, dtype=int), phases=np.full(200, ""))
-    axes = drawn(draw_experiment(given, {"SVM": given.labels}, {})).axes[3]
-    assert axes.get_yticklabels()[1].get_text() == "SVM\nno label"
 
 
 def test_long_recordings_keep_their_peaks():

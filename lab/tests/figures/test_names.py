@@ -60,27 +60,9 @@ def flat_map():
         (lambda: draw_reliability({NAME: np.array([[0.5, 0.5, 10.0]])}), 1),
         (lambda: draw_courses({NAME: COURSE}), 1),
     ],
-    ids=[
-        "recording",
-        "evaluation",
-        "hand",
-        "sensor",
-        "forces",
-        "experiment",
-        "dots",
-        "groups",
-        "reliability",
-        "courses",
-    ],
 )
 def test_a_name_with_two_dollars_is_drawn(draw, n_names):
     figure = draw()
     figure.savefig(io.BytesIO(), format="png", dpi=50)
     texts = [text.get_text().replace(r"\$", "$") for text in figure.findobj(Text)]
     assert sum(NAME in text for text in texts) >= n_names
-
-
-def test_names_of_strong_methods_are_bold():
-    figure = draw_dots({"x": ESTIMATES}, {NAME})
-    weights = {x.get_text(): x.get_fontweight() for x in figure.axes[0].get_yticklabels()}
-    assert weights == {NAME.replace("$", r"\$"): "bold", "other": "normal"}

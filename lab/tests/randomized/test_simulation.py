@@ -5,7 +5,6 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.features import fingertip_force
-from holdfast.io import load_recording, save_recording
 from holdfast_lab.randomized import simulation
 from holdfast_lab.randomized.drawing import (
     MEASURED,
@@ -201,21 +200,11 @@ def test_a_carried_hand_moves_all_the_time(carrier):
     n = min(len(plain.truth.times), len(carried.truth.times))
     change = carried.truth.hand["gravity"][:n] - plain.truth.hand["gravity"][:n]
     assert np.abs(change).max() > 0.05
-    simulated_again = simulate_random(RandomHold(number, seed=3, measured=(carrier,)))
-    assert simulated_again.digest == carried.digest
 
 
 def test_an_unknown_mechanism_is_refused():
     with pytest.raises(ValueError, match="unknown mechanism 'glue'; there are scan, filter, noise"):
         RandomHold(0, measured=("glue",))
-
-
-@pytest.mark.parametrize("kind", SENSOR_KINDS)
-def test_every_kind_of_sensor_can_be_drawn(kind):
-    drawn = draw_sensor(np.random.default_rng(0), kind)
-    assert drawn.sensor.n_taxels >= 5
-    assert 30.0 <= drawn.sensor.rate <= 500.0
-    assert drawn.sensor.range is None or drawn.sensor.unit == "count"
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -235,8 +224,3 @@ def test_events_fill_the_hold_and_do_not_overlap():
         assert ends[-1] < 18.0
         found |= {event.kind for event in events}
     assert found == set(EVENT_KINDS)
-
-
-def test_is_saved_and_loaded(hands, tmp_path):
-    save_recording(hands[0], tmp_path / "hand.parquet")
-    assert load_recording(tmp_path / "hand.parquet").digest == hands[0].digest

@@ -3,7 +3,6 @@ import io
 import json
 import math
 
-import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -51,13 +50,6 @@ def test_a_cell_without_a_row_is_none():
     assert grid.lines[0].cells[1] is None and grid.lines[1].cells[0] is None
 
 
-def test_numbers_as_keys():
-    rows = [Row({"N_w": n, "C": 0.50, "figure": "Acc"}, n) for n in (4, 14)]
-    grid = pivot(ResultTable("w", "", "", rows, ("C",), column="N_w"))
-    assert grid.columns == ("4", "14")
-    assert grid.lines[0].heads == ("0.5",)
-
-
 @pytest.mark.parametrize(
     ("ours", "paper", "expected"),
     [
@@ -81,12 +73,6 @@ def test_numbers_as_text(value, text):
     assert number_text(value, 1) == text
 
 
-def test_a_signed_number_has_its_sign():
-    assert [number_text(value, 1, signed=True) for value in (1.0, -1.0, 0.0, None)] == [
-        "+1.0", "−1.0", "0.0", "–",
-    ]  # fmt: skip
-
-
 keys = st.text(st.characters(exclude_categories=["C"]), min_size=1, max_size=8)
 numbers = st.none() | st.floats(allow_nan=False)
 
@@ -101,11 +87,6 @@ def test_csv_holds_every_value_to_the_last_digit(given_rows):
         for name, _, ours, paper, *_ in lines
     ]
     assert read == given_rows
-
-
-def test_csv_has_no_formulas():
-    made = to_csv(table(row(-1.0, classifier="=1+1")))
-    assert made.splitlines()[1] == "'=1+1,Acc,-1.0,,,,,"
 
 
 def test_csv_by_hand():
@@ -128,34 +109,19 @@ def test_json_is_strict_and_marks_infinite_values():
     ]  # fmt: skip
 
 
-def test_a_table_can_be_sent():
-    made = table(row(math.inf, 95.3, n=60, interval=(None, 2.0)), digits_of={"Acc": 3})
-    assert msgspec.msgpack.decode(msgspec.msgpack.encode(made), type=ResultTable) == made
-
-
 @pytest.mark.parametrize(
-    ("build", "message"),
+    "build",
     [
-        (
-            lambda: ResultTable("a/b", "", "", [], ("x",)),
-            "a table's name is letters, digits, - and _; 'a/b' given",
-        ),
-        (lambda: ResultTable("a", "", "", [], ()), "table a: no key names its lines"),
-        (
-            lambda: table(Row({"paper": "x", "figure": "y"}, 1.0)),
-            "table some: a key may not be called 'paper'",
-        ),
-        (
-            lambda: table(Row({"classifier": "x"}, 1.0)),
-            "table some: a row has no 'figure': {'classifier': 'x'}",
-        ),
-        (lambda: table(row(1), row(2)), "table some: two rows for LogReg / Acc"),
+        lambda: ResultTable("a/b", "", "", [], ("x",)),
+        lambda: ResultTable("a", "", "", [], ()),
+        lambda: table(Row({"paper": "x", "figure": "y"}, 1.0)),
+        lambda: table(Row({"classifier": "x"}, 1.0)),
+        lambda: table(row(1), row(2)),
     ],
 )
-def test_an_inconsistent_table_is_rejected(build, message):
-    with pytest.raises(ValueError) as caught:
+def test_an_inconsistent_table_is_rejected(build):
+    with pytest.raises(ValueError, match="table"):
         build()
-    assert str(caught.value) == message
 
 
 def test_a_table_without_a_paper_has_values_only():

@@ -7,16 +7,15 @@ import pytest
 
 from holdfast.contact import ContactState
 from holdfast.errors import OutputError
-from holdfast.parallel import Engine
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study import run
 from holdfast_lab.study.comparison import all_methods, jobs, sample_tables
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import paper_tables
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from holdfast_lab.study.run import run_study, whole_hand_note
+from holdfast_lab.study.run import run_study
 
-from .example_recordings import recordings_of_cases, save_all, save_synthetic
+from .example_recordings import recordings_of_cases, save_all
 
 ALL_PARTS = run.PARTS
 PAPER = ("confusion", "window", "ablation", "unseen", "fingers", "zhang")
@@ -60,16 +59,6 @@ def test_all_tables_and_figures_are_there(done):
     assert {"ours", "paper", "difference", "n", "interval"} < set(written["confusion"][0])
 
 
-def test_the_report_has_every_table_and_figure(done):
-    out, tables = done
-    report = (out / "report.md").read_text()
-    for table in tables:
-        assert (out / f"tables/{table.name}.md").read_text().strip() in report
-    for path in (out / "figures").iterdir():
-        assert f"(figures/{path.name})" in report
-    assert "- LogReg (the paper): Kitouni, Khoramshahi and Perdereau" in report
-
-
 def test_the_summary_describes_the_run(done, plan):
     document = summary(done[0])
     assert document["seed"] == 0 and document["quick"] is True
@@ -81,7 +70,9 @@ def test_the_summary_describes_the_run(done, plan):
     }  # fmt: skip
     assert document["machine"]["cores"] >= 1
     assert document["seconds"]["data"] == 60.0
-    assert "- Left out: the moon.\n" in (done[0] / "report.md").read_text()
+    report = (done[0] / "report.md").read_text()
+    assert "the moon" in report
+    assert all(f"(figures/{path.name})" in report for path in (done[0] / "figures").iterdir())
 
 
 def test_no_output_contains_the_path_of_the_data(done, plan):
@@ -92,7 +83,7 @@ def test_no_output_contains_the_path_of_the_data(done, plan):
 
 def test_stored_results_are_not_computed_again(done, plan, tmp_path):
     out = shutil.copytree(done[0], tmp_path / "out")
-    with pytest.raises(OutputError, match="already holds a study: choose another name, or give"):
+    with pytest.raises(OutputError, match="--force"):
         run_study(plan, out)
     kept = {path.name: path.read_bytes() for path in (out / "work").glob("*.msgpack")}
     (out / "data").mkdir()
@@ -104,23 +95,7 @@ def test_stored_results_are_not_computed_again(done, plan, tmp_path):
     assert summary(out)["tables"] == summary(done[0])["tables"]
 
 
-def test_other_processes_give_the_same_tables(done, plan, tmp_path):
-    assert run_study(plan, tmp_path / "out", Engine(2)) == done[1]
-
-
 class TestOneFinger:
-    def test_methods_of_whole_hands_are_left_out_and_named(self, tmp_path):
-        folder = save_synthetic(tmp_path / "main", range(2), fingers=("thumb",))
-        plan = StudyPlan({"main": scan_corpus("main", folder)}, quick=True)
-        assert not [n for n in jobs.method_titles(plan) if METHODS[n].whole_hand]
-        (note,) = whole_hand_note(plan)
-        assert "LogReg, global (James & Lepora)" in note
-        assert note.endswith("because only the thumb has labels of both classes.")
-
-    def test_two_fingers_have_them_all(self, plan):
-        assert whole_hand_note(plan) == []
-        assert "jl_global_logreg" in jobs.method_titles(plan)
-
     def test_a_study_of_short_stable_stretches_has_every_table(self, tmp_path, monkeypatch):
         """Nothing is stable for the half second that an event needs: no events, no failure."""
         recordings = (_short(synthetic_recording(f"g-{k}", k, ("thumb",))) for k in range(4))

@@ -1,23 +1,10 @@
-import io
-
 import numpy as np
-import pytest
 
-from holdfast_lab.figures.dots import IntervalEstimate
-from holdfast_lab.trial.course import TrialCourse
+from figures.drawing import drawn
 from holdfast_lab.trial.figures import (
     Distribution,
-    TradeOff,
-    draw_courses,
     draw_distributions,
-    draw_trade_offs,
 )
-
-
-def drawn(figure):
-    """Drawing causes most warnings; they are errors here."""
-    figure.savefig(io.BytesIO(), format="png", dpi=50)
-    return figure
 
 
 def test_a_curve_ends_at_the_share_of_finite_values():
@@ -28,26 +15,3 @@ def test_a_curve_ends_at_the_share_of_finite_values():
     assert list(steps.get_ydata()) == [0.0, 25.0, 50.0, 75.0, 75.0]
     assert steps.get_xdata()[1] == 0.1  # a zero is drawn at the floor
     assert [3.0, 3.0] in [list(line.get_xdata()) for line in axes.lines]
-
-
-def test_a_trade_off_has_both_intervals():
-    one = TradeOff(IntervalEstimate(1.4, 1.3, 1.5), IntervalEstimate(20.0, 10.0, 30.0))
-    none = TradeOff(IntervalEstimate(None), IntervalEstimate(20.0))
-    figure = drawn(draw_trade_offs({"all": {"a": one, "b": none}}, "x", "y", (1.5, 5.0)))
-    (axes,) = figure.axes
-    segments = [path.vertices.tolist() for each in axes.collections for path in each.get_paths()]
-    assert [[1.3, 20.0], [1.5, 20.0]] in segments
-    assert [[1.4, 10.0], [1.4, 30.0]] in segments
-    assert len(axes.lines) == 1
-
-
-@pytest.mark.slow
-def test_courses_share_their_axes():
-    lost = TrialCourse([-0.5, 0.0, 1.0], [2.0, 2, 0], [1.0] * 3, [0, 0, 0.1], 1.0)
-    held = TrialCourse([-1.0, 0.0, 2.0], [2.0, 2, 5], [1.0] * 3, [0.0] * 3)
-    figure = drawn(draw_courses({"fixed": lost, "holdfast": held}))
-    upper, lower = figure.axes[:2], figure.axes[2:]
-    assert upper[0].get_ylim() == upper[1].get_ylim() and upper[0].get_ylim()[1] > 5
-    assert lower[0].get_xlim() == lower[1].get_xlim()
-    assert [text.get_text() for text in upper[0].texts] == ["lost"]
-    assert not upper[1].texts

@@ -1,5 +1,3 @@
-import pytest
-
 from holdfast_grip import GripReason, Limits
 from holdfast_grip.laws import Stability, Touch
 from holdfast_lab.trial.reference_rows import V5Reflex, limits_of, row_named
@@ -26,16 +24,6 @@ class TestV5Reflex:
         assert law.wishes(touches(1.0), 0.1, 0.01) == [(2.0, GripReason.MARGIN)] * 2
         law.start(touches(2.0), 0)
         assert law.wishes(touches(2.0), 0.2, 0.01) == [(1.0, GripReason.NONE)] * 2
-
-    def test_a_level_below_the_first_grip_doubles_it_at_once(self):
-        law = V5Reflex(0.0)
-        law.start(touches(2.0), 0)
-        assert law.wishes(touches(2.0), 0.0, 0.01)[0][0] == 2.0
-
-
-@pytest.mark.parametrize("row", ["fixed", "holdfast", "pr2", "true-slips", "v5-reflex"])
-def test_rows_have_the_limits_as_shipped(row):
-    assert limits_of(row) == Limits()
 
 
 def test_rows_of_the_widest_limits_have_the_same_law():

@@ -28,30 +28,6 @@ def test_numbers_are_over_all_trials_that_were_held():
     assert found["false_reactions_per_minute"]["value"] == pytest.approx(60 / 9)
 
 
-def test_an_infinite_number_is_null():
-    found = summarize([result(dropped=True, slip=math.inf, reaction=math.inf)] * 3)
-    assert found["slip_median"] == {"value": None, "interval": [None, None]}
-    assert found["dropped"] == {"value": 100.0, "interval": [100.0, 100.0]}
-
-
-def test_a_trial_without_slip_has_no_reaction_time():
-    found = summarize([result(slipped=False, reaction=math.nan, slip=0.0)] * 2)
-    assert found["reaction_median"] == {"value": None, "interval": None}
-    assert found["slip_median"]["value"] == 0.0
-
-
-def test_no_trials_give_no_numbers():
-    found = summarize([])
-    assert found["n"] == 0
-    assert found["dropped"] == {"value": None, "interval": None}
-
-
-def test_a_drop_counts_as_no_reaction_even_if_the_force_rose():
-    found = summarize([result(dropped=True, slip=math.inf, reaction=0.01)] * 3)
-    assert found["reaction_median"]["value"] is None
-    assert found["n_slipped"] == 3
-
-
 class TestCompare:
     def test_differences_are_of_the_same_trials(self):
         ours = [result(number=0), result(number=1, slip=0.002), result(number=2, held=False)]
@@ -81,11 +57,6 @@ class TestCompare:
             assert there[name]["interval"] == [-end for end in back[name]["interval"][::-1]]
         assert there["slid_less"] == back["slid_more"]
 
-    def test_trials_without_slip_have_no_reaction_to_compare(self):
-        quiet = [result(number=k, slipped=False, reaction=math.nan) for k in range(2)]
-        found = compare(quiet, [result(number=0), result(number=1)])
-        assert found["reacted_sooner"] == {"value": None, "interval": None}
-
 
 def test_rates_of_false_reactions_may_have_other_quiet_times():
     ours = [result(number=k, n_false=1, quiet_time=3.0) for k in range(3)]
@@ -114,12 +85,6 @@ def test_a_rise_before_the_slip_is_no_reaction():
     assert summarize([lost])["n_reacting"] == 0
 
 
-def test_friction_trials_have_a_reaction_of_their_own():
-    found = summarize([result(reaction=0.01), result(kind="friction", reaction=0.09)])
-    assert found["friction_reaction_median"]["value"] == 0.09
-    assert found["n_friction_reacting"] == 1
-
-
 def test_long_slips_and_drops_have_their_shares_and_reasons():
     slips = [result(slip=slip) for slip in (0.001, 0.002, 0.004)]
     lost = result(dropped=True, drop_reason="limit of force", slip=math.inf)
@@ -127,3 +92,22 @@ def test_long_slips_and_drops_have_their_shares_and_reasons():
     assert found["slipped_over_3mm"]["value"] == 50.0
     assert found["slip_p90"]["value"] is None
     assert found["drops"] == {"limit of force": 1}
+
+
+LOST = {"dropped": True, "slip": math.inf}
+NOTHING = {"value": None, "interval": None}
+
+
+@pytest.mark.parametrize(
+    ("results", "name", "expected"),
+    [
+        ([result(**LOST)] * 3, "slip_median", {"value": None, "interval": [None, None]}),
+        ([result(**LOST)] * 3, "dropped", {"value": 100.0, "interval": [100.0, 100.0]}),
+        ([result(**LOST, reaction=0.01)] * 3, "n_slipped", 3),  # a drop is no reaction
+        ([result(slipped=False, reaction=math.nan)] * 2, "reaction_median", NOTHING),
+        ([], "dropped", NOTHING),
+        ([result(), result(kind="friction")], "n_friction_reacting", 1),
+    ],
+)
+def test_numbers_without_a_value_and_of_parts(results, name, expected):
+    assert summarize(results)[name] == expected

@@ -34,10 +34,6 @@ def packet(made, k, *numbers, stamp=None, received=None, own=None):
 
 
 class TestDevices:
-    def test_one_module_keeps_its_readings(self):
-        given = readings()
-        assert device(1).split(given)["finger1"] is given
-
     def test_modules_in_the_order_of_the_packet(self):
         modules = dict.fromkeys(("a", "b"), sensor("anyskin"))
         board = Device(1, "anyskin", modules)

@@ -3,24 +3,11 @@ import itertools
 import numpy as np
 import pytest
 
+from devices.sources.reading import Clock
 from holdfast.devices.sources import Arrival, base
 from holdfast.devices.sources.base import DeviceSource, notice_arrival
 
 SAMPLE = {"thumb": np.zeros((1, 3))}
-
-
-class Clock:
-    """A clock that only sleep moves."""
-
-    def __init__(self):
-        self.now = 100.0
-
-    def monotonic(self):
-        return self.now
-
-    def sleep(self, seconds):
-        assert seconds >= 0
-        self.now += seconds
 
 
 class ScriptedDevice(DeviceSource):
@@ -80,19 +67,6 @@ def content(source, seconds):
         if arrival is not None:
             got.append((round(arrival.received, 6), *(arrival.notices or ("sample",))))
     return got
-
-
-def test_arrivals_come_in_order(clock):
-    with ScriptedDevice(clock, [sample(100.1), sample(100.2)]) as source:
-        assert content(source, 0.5) == [(100.1, "sample"), (100.2, "sample")]
-        assert not source.ended
-
-
-def test_a_timeout_gives_none(clock):
-    with ScriptedDevice(clock, []) as source:
-        assert source.read(0.2) is None
-        assert clock.now == pytest.approx(100.2)
-        assert source.read(0.0) is None
 
 
 def test_silence_is_reported_once(clock):

@@ -7,6 +7,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from devices.sources.reading import LIMIT, some_of
 from devices.sources.sources import BROKEN, ENDING, EVERY, LASTING, N_SOON
 from holdfast.detector import Detector
 from holdfast.errors import HoldfastError
@@ -14,9 +15,6 @@ from holdfast.model import Model
 from holdfast.sensors import Sensor
 
 pytestmark = pytest.mark.slow
-
-LIMIT = 20.0
-"""A test that hangs fails after this [s]."""
 
 
 @pytest.fixture(params=EVERY)
@@ -43,18 +41,6 @@ def broken(request, tmp_path, monkeypatch):
         yield source
 
 
-def some_of(source, n=N_SOON):
-    """The next arrivals with samples."""
-    got = []
-    end = time.monotonic() + LIMIT
-    while len(got) < n and time.monotonic() < end:
-        arrival = source.read(0.1)
-        if arrival is not None and arrival.samples:
-            got.append(arrival)
-    assert len(got) == n
-    return got
-
-
 def test_entering_makes_the_modules_known(ready):
     with ready.source as source:
         assert source is ready.source
@@ -72,7 +58,7 @@ def test_metadata_are_plain_and_name_the_source(ready):
 
 def test_samples_have_the_shape_of_the_sensors(ready):
     with ready.source as source:
-        for arrival in some_of(source):
+        for arrival in some_of(source, N_SOON):
             assert set(arrival.samples) <= set(source.sensors)
             assert set(arrival.faults) <= set(source.sensors)
             for name, sample in arrival.samples.items():
@@ -83,7 +69,7 @@ def test_samples_have_the_shape_of_the_sensors(ready):
 
 def test_times_go_forward(ready):
     with ready.source as source:
-        arrivals = some_of(source)
+        arrivals = some_of(source, N_SOON)
         times = np.array([arrival.time for arrival in arrivals])
         received = np.array([arrival.received for arrival in arrivals])
         assert np.isfinite(times).all()
@@ -105,7 +91,7 @@ def test_samples_are_not_written_to_again(ready):
 def test_a_detector_takes_everything(ready):
     with ready.source as source:
         detector = Detector(Model.load("builtin:noise-floor"), source.sensors)
-        for arrival in some_of(source):
+        for arrival in some_of(source, N_SOON):
             estimate = detector.update(arrival.samples, arrival.time)
         assert set(estimate.fingers) == set(source.sensors)
 

@@ -1,22 +1,15 @@
-import importlib
-import itertools
-import sys
 import time
 from contextlib import contextmanager
 
-import msgspec
 import numpy as np
 import pytest
 
 import holdfast.devices.sources.serial as module
 from devices.sources.board import Board, packet, some
+from devices.sources.reading import some_of, until
 from holdfast.contact import Fault
 from holdfast.devices.sources import base, open_source
-from holdfast.errors import MissingExtra, SourceError
-from holdfast.sensors import sensor
-
-LIMIT = 20.0
-"""A test that hangs fails after this [s]."""
+from holdfast.errors import SourceError
 
 
 @pytest.fixture
@@ -50,35 +43,11 @@ def started(board, text="", n_mags=5):
         source.close()
 
 
-def samples_of(source, n):
-    got = []
-    end = time.monotonic() + LIMIT
-    while len(got) < n and time.monotonic() < end:
-        arrival = source.read(0.1)
-        if arrival is not None and arrival.samples:
-            got.append(arrival)
-    assert len(got) == n
-    return got
-
-
-def wait_for(source, wanted):
-    """Arrivals up to the first that is wanted."""
-    got = []
-    end = time.monotonic() + LIMIT
-    while time.monotonic() < end:
-        arrival = source.read(0.1)
-        if arrival is not None:
-            got.append(arrival)
-            if wanted(arrival):
-                return got
-    pytest.fail(f"not among {got}")
-
-
 def test_values_are_exact(board):
     given = some(20)
     with started(board) as source:
         board.send(*map(packet, given))
-        arrivals = samples_of(source, 20)
+        arrivals = some_of(source, 20)
     np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in arrivals], given)
     times = [arrival.time for arrival in arrivals]
     assert (np.diff(times) > 0).all()
@@ -90,67 +59,33 @@ def test_samples_that_come_together_are_a_period_apart(board):
     with started(board) as source:
         time.sleep(0.2)
         board.send(b"".join(map(packet, some(10))))
-        arrivals = samples_of(source, 10)
+        arrivals = some_of(source, 10)
     assert len({arrival.received for arrival in arrivals}) == 1
     assert np.diff([arrival.time for arrival in arrivals]) == pytest.approx(0.01)
     assert arrivals[-1].time == arrivals[-1].received
-
-
-def test_samples_that_waited_are_late(board):
-    with started(board) as source:
-        time.sleep(0.5)
-        board.send(b"".join(map(packet, some(30))))
-        arrivals = samples_of(source, 30)
-    assert arrivals[0].faults == {"finger1": (Fault.LATE,)}
-    assert arrivals[-1].faults == {}
 
 
 def test_a_board_may_carry_several_sensors(board):
     given = some(1, 10)
     with started(board, "?mags=10&fingers=2:thumb&baud=9600", n_mags=10) as source:
         board.send(packet(given[0]))
-        (arrival,) = samples_of(source, 1)
+        (arrival,) = some_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0, :5])
     np.testing.assert_array_equal(arrival.samples["thumb"], given[0, 5:])
-
-
-def test_a_sensor_from_a_file(board, tmp_path):
-    path = tmp_path / "mine.json"
-    mine = sensor("papillarray").to_dict() | {"name": "mine", "unit": "count"}
-    path.write_bytes(msgspec.json.encode(mine))
-    given = some(1, 9)
-    with started(board, f"?sensor={path}", n_mags=9) as source:
-        board.send(packet(given[0]))
-        np.testing.assert_array_equal(samples_of(source, 1)[0].samples["finger1"], given[0])
-        assert source.sensors["finger1"].name == "mine"
-
-
-def test_garbage_is_counted_and_reported(board):
-    given = some(4)
-    with started(board) as source:
-        board.send(*map(packet, given[:2]), b"\xff" * 200 + b"\r\n", *map(packet, given[2:]))
-        arrivals = wait_for(
-            source, lambda a: a.samples and (a.samples["finger1"] == given[3]).all()
-        )
-    samples = [arrival.samples["finger1"] for arrival in arrivals if arrival.samples]
-    np.testing.assert_array_equal(samples, given)
-    assert sum(arrival.n_refused for arrival in arrivals) == 3
-    notices = [notice for arrival in arrivals for notice in arrival.notices]
-    assert notices == ["invalid packets are dropped"]
 
 
 def test_another_number_of_magnetometers_gives_a_fault_and_no_sample(board):
     given = some(1)
     with started(board) as source:
         board.send(*map(packet, some(9, 4)))
-        arrivals = wait_for(source, lambda a: a.faults)
+        arrivals = until(source, lambda a: a.faults)
         assert not any(arrival.samples for arrival in arrivals)
         assert arrivals[-1].faults == {"finger1": (Fault.TAXEL_COUNT,)}
         assert np.isnan(arrivals[-1].time)
         notices = [notice for arrival in arrivals for notice in arrival.notices]
         assert "mags=" in notices[-1]
         board.send(packet(given[0]))
-        (arrival,) = samples_of(source, 1)
+        (arrival,) = some_of(source, 1)
     np.testing.assert_array_equal(arrival.samples["finger1"], given[0])
     assert arrival.faults == {}
 
@@ -160,16 +95,16 @@ def test_an_unplugged_board_is_connected_again(board, impatient):
     with started(board) as source:
         before = time.monotonic()
         board.unplug()
-        arrivals = wait_for(source, lambda a: a.notices)
+        arrivals = until(source, lambda a: a.notices)
         assert not arrivals[-1].samples
         assert arrivals[-1].notices[0].startswith("connection lost (")
         assert source.read(0.2) is None
         assert not source.ended
         board.plug()
-        arrivals = wait_for(source, lambda a: a.notices)
+        arrivals = until(source, lambda a: a.notices)
         assert arrivals[-1].notices[0].startswith("connected again after 0.")
         board.send(b"half a packet\r\n", *map(packet, given))
-        after = samples_of(source, 3)
+        after = some_of(source, 3)
     np.testing.assert_array_equal([arrival.samples["finger1"] for arrival in after], given)
     assert after[0].time > before
 
@@ -196,17 +131,6 @@ def test_a_port_without_permission_is_an_error(board, monkeypatch):
         open_source(f"serial://{board.path}").open()
 
 
-def test_a_file_that_is_no_port_is_an_error(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(SourceError, match="Could not configure port"):
-        open_source(f"serial://{tmp_path}/file").open()
-
-
-def test_a_port_can_be_opened_once(board):
-    with started(board), pytest.raises(SourceError, match="lock"):
-        open_source(f"serial://{board.path}").open()
-
-
 def test_silence_after_opening_is_an_error(board, impatient):
     source = open_source(f"serial://{board.path}")
     with pytest.raises(SourceError, match="nothing came"), source:
@@ -215,25 +139,18 @@ def test_silence_after_opening_is_an_error(board, impatient):
         pass
 
 
-def test_garbage_after_opening_is_an_error(board, impatient):
+@pytest.mark.parametrize(
+    ("sent", "message"),
+    [(b"\xff" * 82, "invalid packets"), (packet(some(1, 4)[0]), "4 magnetometers")],
+)
+def test_other_data_after_opening_are_an_error(board, impatient, sent, message):
     source = open_source(f"serial://{board.path}")
-    board.keep_sending([b"\xff" * 82] * 10_000)
+    board.keep_sending([sent] * 10_000)
     try:
-        with pytest.raises(SourceError, match="invalid packets"):
+        with pytest.raises(SourceError, match=message):
             source.__enter__()
     finally:
         board.hush()
-
-
-def test_another_number_of_magnetometers_after_opening_is_an_error(board):
-    source = open_source(f"serial://{board.path}")
-    board.keep_sending([packet(some(1, 4)[0])] * 10_000)
-    try:
-        with pytest.raises(SourceError) as error:
-            source.__enter__()
-    finally:
-        board.hush()
-    assert "4 magnetometers" in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -254,13 +171,3 @@ def test_another_number_of_magnetometers_after_opening_is_an_error(board):
 def test_invalid_parameters(text, message):
     with pytest.raises(ValueError, match=message):
         open_source(text)
-
-
-def test_without_pyserial_the_extra_is_named(monkeypatch):
-    monkeypatch.delitem(sys.modules, "holdfast.devices.sources.serial")
-    for name in list(itertools.chain(sys.modules)):
-        if name.split(".")[0] == "serial":
-            monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "serial", None)
-    with pytest.raises(MissingExtra, match="serial"):
-        importlib.import_module("holdfast.devices.sources.serial")

@@ -73,22 +73,12 @@ def test_a_module_that_stops_and_one_that_never_comes():
     assert_same(timed_samples([recording]), recording)
 
 
-def test_samples_are_in_native_byte_order():
-    recording = Recording("made", {"thumb": module(np.arange(5.0), dtype=">u2")})
-    for item in timed_samples([recording]):
-        assert item.samples["thumb"].dtype == np.dtype("=u2")
-
-
 def test_markers_come_after_the_samples_of_their_time():
     markers = ((0.05, "closed"), (0.055, "two\nlines"), (0.05, "and held"))
     got = list(timed_samples([hand(20, markers=markers)]))
     place = [k for k, item in enumerate(got) if item.notice]
-    assert [got[k].notice for k in place] == [
-        "marker: closed",
-        "marker: and held",
-        "marker: two lines",
-    ]
-    assert [got[k].time for k in place] == [0.05, 0.05, 0.055]
+    texts = [(got[k].time, got[k].notice.removeprefix("marker: ")) for k in place]
+    assert texts == [(0.05, "closed"), (0.05, "and held"), (0.055, "two lines")]
     assert got[place[0] - 1].time == 0.05
     assert all(not got[k].samples for k in place)
     assert [item.time for item in got] == sorted(item.time for item in got)

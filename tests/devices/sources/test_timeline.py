@@ -154,9 +154,17 @@ def share_of_faults(pairs):
     return sum(bool(one.faults) for one in stamped) / len(stamped)
 
 
-@pytest.mark.parametrize("speed", [1.2, 1.5, 3.0])
-def test_a_clock_that_is_too_fast_is_a_fault_within_a_second(speed):
-    assert share_of_faults([(1000.0 + speed * k * PERIOD, k * PERIOD) for k in range(900)]) == 1
+@pytest.mark.parametrize(
+    ("device_time", "share"),
+    [
+        *((lambda k, s=s: s * k * PERIOD, 1) for s in (1.2, 1.5, 3.0)),  # too fast
+        (lambda k: 1.05 * k * PERIOD, 0),
+        *((lambda k, s=s: s * k, 1) for s in (-PERIOD, -0.3 * PERIOD, -0.04, -1.0, 0.0)),
+        (lambda k: 60.0 * (k % 2), 1),  # jumps again and again
+    ],
+)
+def test_an_impossible_clock_is_a_fault_within_a_second(device_time, share):
+    assert share_of_faults([(1000.0 + device_time(k), k * PERIOD) for k in range(900)]) == share
 
 
 def test_a_recording_that_is_played_fast_is_no_fault():
@@ -164,19 +172,6 @@ def test_a_recording_that_is_played_fast_is_no_fault():
     for k in range(900):
         assert timeline.stamp(1000.0 + 8 * k * PERIOD, k * PERIOD).faults == ()
     assert timeline.clock.pace == pytest.approx(8.0, rel=0.01)
-
-
-def test_a_clock_that_is_a_little_too_fast_is_none():
-    assert share_of_faults([(1000.0 + 1.05 * k * PERIOD, k * PERIOD) for k in range(900)]) == 0
-
-
-@pytest.mark.parametrize("step", [-PERIOD, -0.3 * PERIOD, -0.04, -1.0, 0.0])
-def test_a_clock_that_goes_backwards_or_stands_still_is_a_fault_within_a_second(step):
-    assert share_of_faults([(1000.0 + step * k, k * PERIOD) for k in range(900)]) == 1
-
-
-def test_a_clock_that_jumps_again_and_again_is_a_fault():
-    assert share_of_faults([(1000.0 + 60.0 * (k % 2), k * PERIOD) for k in range(900)]) == 1
 
 
 def test_a_burst_at_the_start_makes_no_clock_fast():
@@ -224,18 +219,18 @@ def test_a_delay_after_a_reset():
 
 
 @pytest.mark.parametrize(
-    ("stamp", "text"),
+    ("stamp", "words"),
     [
         (1.7e9, None),
         (1.7e9 - 59, None),
         (3000.0, None),
         (-5.0, None),
-        (1.7e9 - 90, "are 2 min behind the clock of this machine: old data?"),
-        (1.7e9 - 7201, "are 2 h behind the clock of this machine: old data?"),
-        (1.5e9, "are 2315 d behind the clock of this machine: old data?"),
-        (1.8e9, "are 1157 d ahead of the clock of this machine: is its clock set?"),
+        (1.7e9 - 90, "2 min behind"),
+        (1.7e9 - 7201, "2 h behind"),
+        (1.5e9, "2315 d behind"),
+        (1.8e9, "1157 d ahead"),
     ],
 )
-def test_stamps_of_another_time(stamp, text):
-    expected = None if text is None else f"the stamps of the device {text}"
-    assert clock_notice(stamp, 1.7e9) == expected
+def test_stamps_of_another_time(stamp, words):
+    notice = clock_notice(stamp, 1.7e9)
+    assert notice is None if words is None else words in notice

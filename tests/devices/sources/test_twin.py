@@ -10,7 +10,7 @@ import pytest
 
 from holdfast.devices.sources import open_source, replay
 from holdfast.devices.sources import twin as module
-from holdfast.devices.sources.twin import GRASP_ATTEMPTS, AskedTwin, Twin, grasp_of, write
+from holdfast.devices.sources.twin import AskedTwin, Twin, grasp_of, write
 from holdfast.devices.uri import parse
 from holdfast.io.stickers import picture_stamps
 from holdfast.recordings import Recording, Tactile
@@ -69,13 +69,6 @@ def test_samples_are_those_of_the_simulation(server):
         assert readings.dtype == one.readings.dtype
 
 
-def test_metadata_are_those_of_the_recording_and_the_uri(monkeypatch):
-    monkeypatch.setattr(module, "simulate", lambda _: ball())
-    with open_source(BALL) as source:
-        assert source.metadata == {**ball().metadata, "source": BALL}
-        assert source.name == BALL
-
-
 def test_missing_parameters_have_defaults():
     assert grasp_of(parse("twin:")[1]) == Grasp("can", 2, 1, "reference", 0)
     text = "twin:?object=ball&case=1&repeat=7&profile=gentle&seed=9&server=true"
@@ -88,13 +81,6 @@ def test_a_grasp_that_fails_is_tried_again(quick):
         arrivals = list(source)
     assert arrivals[0].notices == ("the twin grasps: can-case2-1, after 2 failed attempts",)
     assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {12}
-
-
-def test_a_grasp_that_always_fails_is_played(quick):
-    quick(failing={(1, attempt) for attempt in range(GRASP_ATTEMPTS)})
-    with open_source("twin:", speed=0) as source:
-        arrivals = list(source)
-    assert arrivals[0].notices == ("the twin grasps: can-case2-1-failed4, after 3 failed attempts",)
 
 
 def test_the_next_repeats_follow(quick):

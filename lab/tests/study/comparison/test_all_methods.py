@@ -1,4 +1,3 @@
-import msgspec
 import numpy as np
 import pytest
 
@@ -9,13 +8,12 @@ from holdfast_lab.study.comparison import (
     jobs,
     real_recordings,
     sample_tables,
-    strongest,
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.methods import METHODS
-from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from study.example_recordings import recording_with_truth, save_all
+from holdfast_lab.study.plan import StudyPlan
+from study.example_recordings import corpora_of, recording_with_truth, results_of, rows_of
 
 pytestmark = pytest.mark.slow
 
@@ -28,20 +26,14 @@ TABLES = (
 
 @pytest.fixture(scope="module")
 def plan(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("comparison")
     seeds = {
         "main": range(4),
         "others": range(10, 13),
         "gentle": range(20, 22),
         "glitch-1": range(30, 32),
     }
-    corpora = {
-        name: scan_corpus(
-            name, save_all(folder / name, [recording_with_truth(f"grasp-{s}", s) for s in each])
-        )
-        for name, each in seeds.items()
-    }
-    return StudyPlan(corpora)
+    folder = tmp_path_factory.mktemp("comparison")
+    return StudyPlan(corpora_of(folder, seeds, recording_with_truth))
 
 
 @pytest.fixture(scope="module")
@@ -57,18 +49,6 @@ def few():
         yield
 
 
-def results_of(tasks):
-    """Return the result of each task, through msgpack as the study keeps it."""
-    done = {}
-    results = {}
-    for task in tasks:
-        key = (task.function.__qualname__, msgspec.msgpack.encode(task.arguments))
-        if key not in done:
-            done[key] = msgspec.msgpack.encode(task.function(*task.arguments))
-        results[task.name] = msgspec.msgpack.decode(done[key], type=task.result)
-    return results
-
-
 @pytest.fixture(scope="module")
 def results(plan, few):
     return results_of(all_methods.tasks(plan))
@@ -77,10 +57,6 @@ def results(plan, few):
 @pytest.fixture(scope="module")
 def tables(plan, results):
     return {table.name: table for table in all_methods.tables(plan, results)}
-
-
-def rows_of(table, **keys):
-    return [row for row in table.rows if keys.items() <= row.keys.items()]
 
 
 def test_names_of_tasks_are_unique_over_all_parts(plan, few):
@@ -96,17 +72,6 @@ def test_the_tables_can_be_laid_out(tables):
     for table in tables.values():
         assert table.rows and table.note
         assert to_markdown(table) and to_json(table)
-
-
-def test_every_method_by_every_split(tables):
-    on = {(row.keys["method"], row.keys["on"]) for row in tables["methods"].rows}
-    titles = {METHODS[name].title for name in FEW}
-    assert {method for method, _ in on} == titles
-    everywhere = {"by recording", "by object", "unseen objects"}
-    assert {where for method, where in on if method == METHODS["logreg"].title} == {
-        *everywhere, "gentle profile", "1 glitch a minute",
-    }  # fmt: skip
-    assert {w for m, w in on if m == METHODS["jl_global_logreg"].title} == everywhere
 
 
 def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables):
@@ -126,68 +91,11 @@ def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables)
             assert row.ours == pytest.approx(accuracy(own) - accuracy(best))
             low, high = row.interval
             assert low <= row.ours <= high
-    for key in ("by recording", "by object", "unseen objects"):
-        with_row = {
-            row.keys["method"]
-            for row in rows_of(tables["methods"], figure=sample_tables.ACCURACY_DIFFERENCE, on=key)
-        }
-        assert len(with_row) == len(FEW) - 1
 
 
 def accuracy(metrics):
     right, n = np.array(list(correct_and_all(metrics).values())).sum(axis=0)
     return 100 * right / n
-
-
-def test_a_hand_has_one_decision_where_fingers_have_two(plan, results, tables):
-    (row,) = rows_of(
-        tables["hands"], method=METHODS["logreg"].title, on="by recording", figure="accuracy [%]"
-    )
-    hand = results["methods/logreg"]["recording"].hand
-    assert row.ours == pytest.approx(hand.pooled.accuracy)
-    assert hand.pooled.n <= 4 * 1725
-
-
-def test_all_methods_are_scored_on_the_same_samples(results):
-    """A hand has as many scored samples by every method; a longer history leaves more out."""
-    for key in ("recording", "others"):
-        n = {name: results[f"methods/{name}"][key].hand.pooled.n for name in FEW}
-        assert len(set(n.values())) == 1
-    without = {
-        name: sum(n for _, n in results[f"methods/{name}"]["recording"].hand_without_estimate)
-        for name in FEW
-    }
-    assert without["jl_global_logreg"] < without["logreg"] == without["zhang"]
-
-
-def test_the_share_without_an_estimate_is_a_column(results, tables):
-    for table, counts in (("methods", "without_estimate"), ("hands", "hand_without_estimate")):
-        (row,) = rows_of(
-            tables[table],
-            method=METHODS["logreg"].title,
-            on="by recording",
-            figure="without estimate [%]",
-        )
-        n, n_without = np.sum(getattr(results["methods/logreg"]["recording"], counts), axis=0)
-        assert row.ours == pytest.approx(100 * n_without / n)
-        assert row.ours > 0
-
-
-READINGS = ["an event", "a false alarm", "left out"]
-
-
-def test_every_table_of_events_has_all_readings_of_glitches(tables):
-    for name in ("events", "glitch_rates"):
-        found = list(dict.fromkeys(row.keys["a glitch is"] for row in tables[name].rows))
-        assert found == READINGS
-    assert {row.keys["on"] for row in tables["glitch_rates"].rows} == {"1 glitch a minute"}
-
-
-def test_a_glitch_is_one_more_event_where_it_counts_as_one(tables):
-    """Each of the four recordings has one disturbance, one release and one glitch."""
-    for reading, n in zip(READINGS, (12, 8, 8), strict=True):
-        keys = {"a glitch is": reading, "on": "by recording", "figure": "events"}
-        assert {row.ours for row in rows_of(tables["events"], **keys)} == {n}
 
 
 def test_false_alarms_add_up(tables):
@@ -198,15 +106,6 @@ def test_false_alarms_add_up(tables):
             for figure in ("of a glitch", "other false alarms")
         ]
         assert row.ours == pytest.approx(sum(part.ours for part in parts))
-
-
-def test_glitches_are_described_by_the_truth(tables):
-    """One jump in each recording, after which nothing slides; held for 7.2 s."""
-    own = {row.keys["figure"]: row for row in rows_of(tables["glitches"], on="by recording")}
-    assert own["glitches"].ours == 4
-    assert own["glitches per minute held"].ours == pytest.approx(60 / 7.2, rel=0.01)
-    assert own["object slides [%]"].ours == 0
-    assert own["slip distance median [mm]"].ours is None
 
 
 def test_ours_beside_the_strongest_baseline(results, tables):
@@ -227,17 +126,7 @@ def test_ours_beside_the_strongest_baseline(results, tables):
     assert ratio.ours == pytest.approx(errors[best] / errors["holdfast"])
     low, high = ratio.interval
     assert low <= ratio.ours and (high is None or ratio.ours <= high)
-    kinds = list(dict.fromkeys((r.keys["error"], r.keys["left out"]) for r in table.rows))
-    assert kinds == [(each.title, each.left_out) for each in strongest.MEASURES]
     assert all(row.keys["baseline"] != METHODS["holdfast"].title for row in table.rows)
-
-
-def test_the_random_split_has_the_value_of_the_paper(tables):
-    values = {row.keys["method"]: row.paper for row in rows_of(tables["splits"], split="random")}
-    names = ("logreg", "logreg_unweighted", "holdfast")
-    assert [values.pop(METHODS[name].title) for name in names] == [95.3, 95.3, None]
-    assert not values
-    assert {r.keys["split"] for r in tables["splits"].rows} >= {"random", "by recording"}
 
 
 def test_the_figures_can_be_drawn(plan, results):
@@ -245,16 +134,3 @@ def test_the_figures_can_be_drawn(plan, results):
     assert [each.name for each in drawn] == ["methods", "alarms", "reliability"]
     for each in drawn:
         each.figure.draw_without_rendering()
-
-
-def test_a_quick_study_evaluates_less(plan, monkeypatch):
-    monkeypatch.setattr(jobs, "METHODS", METHODS)
-    quick = StudyPlan(plan.corpora, quick=True)
-    assert not set(jobs.SLOW_METHODS) & set(jobs.method_titles(quick))
-    assert jobs.method_job(quick, "zhang").tests == ()
-    assert jobs.method_job(quick, "logreg").tests == tuple(
-        plan.corpora[role] for role in ("others", "gentle", "glitch-1")
-    )
-    assert sum(t.cost for t in all_methods.tasks(quick)) < sum(
-        t.cost for t in all_methods.tasks(plan)
-    )

@@ -150,10 +150,6 @@ class TestIntervals:
         every = [labels(name=str(seed)) for seed in range(n)]
         return every, count_recordings(every, {"one": own})["one"]
 
-    def test_there_are_none_of_two_recordings(self):
-        _, counts = self.counts(2)
-        assert all(row.interval is None for row in recording_rows({}, counts, 0))
-
     def test_three_recordings_have_them(self):
         _, counts = self.counts(3)
         rows = {row.keys["figure"]: row for row in recording_rows({}, counts, 0)}
@@ -176,10 +172,6 @@ class TestIntervals:
             rows["AUC of builtin:any"].ours - rows["AUC"].ours
         )
         assert rows["difference"].interval[0] < rows["difference"].ours
-
-    def test_a_pair_of_whole_hands_has_the_scores_of_hands(self):
-        (pair,) = count_pairs([labels()], [estimates(RIGHT)], [estimates(RIGHT, fingers=())])
-        assert len(pair.first.stable) == len(pair.second.stable) == N - 40
 
 
 def test_the_auc_of_recordings_is_that_of_all_their_samples():

@@ -11,7 +11,6 @@ from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, compute_decisions, train
 from holdfast_lab.study.comparison import real_models
-from holdfast_lab.study.comparison.real_estimates import method_estimates
 from holdfast_lab.study.comparison.real_models import SHIPPED, model_estimates
 from holdfast_lab.study.comparison.real_recordings import MODELS
 from holdfast_lab.study.plan import scan_corpus
@@ -122,11 +121,6 @@ def test_recordings_that_the_model_refuses_have_no_estimate(tmp_path):
     for making in MODELS:
         for each in model_estimates(making, corpus, 0):
             assert (each.hand.states.array == UNKNOWN).all() and not each.known.array.any()
-
-
-def test_the_folds_are_those_of_the_methods(corpus):
-    names = [each.name for each in method_estimates("logreg", corpus, 0)]
-    assert [each.name for each in model_estimates("untouched", corpus, 0)] == names
 
 
 class TestHand:

@@ -1,18 +1,16 @@
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
-from holdfast_lab.report.result_tables import pivot
 from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison import jobs, real_recordings
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from study.example_recordings import save_all
+from study.example_recordings import results_of, save_all
 
 pytestmark = pytest.mark.slow
 
@@ -22,14 +20,6 @@ DISTURBED = [
     Label(6.5, 8.0, ContactState.STABLE),
 ]
 CALM = [Label(3.0, 8.0, ContactState.STABLE)]
-
-
-def run(plan):
-    results = {}
-    for task in real_recordings.tasks(plan):
-        data = msgspec.msgpack.encode(task.function(*task.arguments))
-        results[task.name] = msgspec.msgpack.decode(data, type=task.result)
-    return real_recordings.tables(plan, results)
 
 
 @pytest.fixture(scope="module")
@@ -63,56 +53,14 @@ def made(corpus):
     with pytest.MonkeyPatch.context() as patch:
         names = ("logreg", "zhang", "jl_global_logreg")
         patch.setattr(jobs, "METHODS", {name: METHODS[name] for name in names})
-        return {table.name: table for table in run(StudyPlan({"main": corpus}, real=corpus))}
-
-
-def lines(table):
-    return [line.heads for line in pivot(table).lines]
-
-
-METHODS_OF_TABLES = [
-    ("builtin:any", "the twin"),
-    ("builtin:any", "the twin, 1 other"),
-    ("builtin:any", "the twin, the others"),
-    ("features of builtin:any", "the others"),
-    ("LogReg (the paper)", "the others"),
-    (METHODS["zhang"].title, "the others"),
-    (METHODS["jl_global_logreg"].title, "the others"),
-]
+        plan = StudyPlan({"main": corpus}, real=corpus)
+        tables = real_recordings.tables(plan, results_of(real_recordings.tasks(plan)))
+        return {table.name: table for table in tables}
 
 
 def test_the_tables(made):
     assert list(made) == ["real", "real_recordings", "real_fingers", "real_pairs"]
     assert all(to_markdown(table) for table in made.values())
-    assert lines(made["real"]) == METHODS_OF_TABLES
-    names = [f"pick-{k}" for k in range(4)]
-    assert lines(made["real_recordings"]) == [(n, *m) for n in names for m in METHODS_OF_TABLES]
-    assert lines(made["real_fingers"]) == [
-        (name, finger, *method)
-        for name in names[:2]
-        for finger in ("finger1", "finger2")
-        for method in METHODS_OF_TABLES[:-1]
-    ]
-    assert lines(made["real_pairs"]) == [
-        (name, *method)
-        for name in ("all", *names[:2])
-        for method in METHODS_OF_TABLES[1:]
-    ]  # fmt: skip
-
-
-def test_intervals_are_over_the_four_recordings(made):
-    rows = {row.keys["figure"]: row for row in made["real"].rows}
-    for figure in ("AUC", "AUC of the hand", "accuracy [%]", "stable called STABLE [%]"):
-        assert rows[figure].n == 4 and rows[figure].interval is not None
-    assert all(row.interval is None for row in made["real_recordings"].rows)
-
-
-def test_all_lines_have_the_same_samples(made):
-    n = {}
-    for row in made["real_fingers"].rows:
-        if row.keys["figure"] == "stable samples":
-            n.setdefault((row.keys["recording"], row.keys["finger"]), set()).add(row.ours)
-    assert n and all(len(each) == 1 for each in n.values())
 
 
 def test_a_shaken_hold_is_ranked_below_a_calm_one(made):
@@ -120,37 +68,3 @@ def test_a_shaken_hold_is_ranked_below_a_calm_one(made):
     areas = [row.ours for row in made["real_fingers"].rows
              if row.keys["method"] == energy and row.keys["figure"] == "AUC"]  # fmt: skip
     assert len(areas) == 4 and all(area > 0.8 for area in areas)
-
-
-def test_a_quick_study_has_few_methods(corpus):
-    plan = StudyPlan({"main": corpus}, real=corpus, quick=True)
-    names = [task.name for task in real_recordings.tasks(plan)]
-    assert names == [
-        "real/labels", "real/untouched", "real/adapted to one", "real/adapted to all",
-        "real/from nothing", "real/logreg", "real/holdfast", "real/zhang", "real/spectrum",
-        "real/difference", "real/anyskin",
-    ]  # fmt: skip
-    assert set(real_recordings.QUICK_REAL_METHODS) <= set(METHODS)
-
-
-def test_one_finger_has_no_whole_hand_methods(corpus):
-    one = msgspec.structs.replace(corpus, fingers=("finger1",))
-    plan = StudyPlan({"main": corpus}, real=one)
-    assert not [n for n in real_recordings.real_methods(plan, one) if METHODS[n].whole_hand]
-    assert "jl_global_logreg" in real_recordings.real_methods(plan, corpus)
-
-
-def test_the_caveat_of_the_box_is_given_for_the_box_only(corpus, made, monkeypatch):
-    assert "one box" not in made["real"].note
-    own = corpus.load()[0].metadata.get("source")
-    monkeypatch.setattr(real_recordings.uskin_pick_move, "SOURCE", own)
-    plan = StudyPlan({"main": corpus}, real=corpus)
-    monkeypatch.setattr(jobs, "METHODS", {"logreg": METHODS["logreg"]})
-    untouched = {"untouched": real_recordings.MODELS["untouched"]}
-    monkeypatch.setattr(real_recordings, "MODELS", untouched)
-    assert "recordings of one box" in run(plan)[0].note
-
-
-def test_without_real_recordings_there_is_nothing_to_do(corpus):
-    plan = StudyPlan({"main": corpus})
-    assert (real_recordings.tasks(plan), real_recordings.tables(plan, {})) == ([], [])

@@ -7,7 +7,6 @@ from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast_lab.study.comparison.rows import (
     calibration_row,
     correct_and_all,
-    count_row,
     difference_row,
     quantile_row,
     quotient_row,
@@ -72,10 +71,6 @@ def test_quantiles_may_be_infinite():
     assert row.interval == (pytest.approx(0.2), None)
     assert quantile_row({}, [[math.inf]], 0.95, seed=0).ours == math.inf
     assert quantile_row({}, [[]], 0.5, seed=0).ours is None
-
-
-def test_counts_are_added():
-    assert count_row({}, [2, 3]).ours == 5
 
 
 def test_sample_rows_with_the_values_of_the_paper():

@@ -6,7 +6,6 @@ from holdfast.metrics.slips import SlipMetrics
 from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison.slip_table import (
     QUICK_SLIP_METHODS,
-    method_keys,
     slip_methods,
     slip_rows,
     tables,
@@ -62,10 +61,6 @@ def test_a_line_has_each_figure_with_its_interval():
     assert {row.n for row in rows.values()} == {6}
 
 
-def test_one_recording_has_no_interval():
-    assert all(row.interval is None for row in slip_rows({}, evaluation(intervals=None)))
-
-
 @pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 24)])
 def test_each_method_has_a_task_and_lines(quick, n):
     plan = StudyPlan({"main": corpus("main"), "others": corpus("others")}, quick=quick)
@@ -94,15 +89,6 @@ def test_a_line_for_each_budget():
     assert found == [("1/min held", 61.0), ("1/min quiet", 88.0)]
 
 
-def test_without_known_slips_there_is_no_table():
-    plan = StudyPlan({"main": corpus("main")}, quick=True)
-    assert tables(plan, {task.name: {} for task in tasks(plan)}) == []
-
-
 def test_methods_of_whole_hands_need_two_fingers():
     plan = StudyPlan({"main": corpus("main", ("thumb",))})
     assert not any(SLIP_METHODS[name].method.whole_hand for name in slip_methods(plan))
-
-
-def test_the_rule_of_stability_is_named_so():
-    assert method_keys("holdfast_stability") == {"fitted to": "stability", "method": "holdfast"}

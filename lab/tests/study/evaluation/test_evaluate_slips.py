@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
@@ -24,9 +22,8 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
 from holdfast_lab.study.evaluation.fitted_method import MethodTraining, probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
-from holdfast_lab.study.methods.slip_methods import SLIP_METHODS
 from holdfast_lab.study.plan import scan_corpus
-from study.example_recordings import SLIPS, recording_with_truth, save_all, save_synthetic
+from study.example_recordings import SLIPS, corpora_of, inside, recording_with_truth, save_synthetic
 
 pytestmark = pytest.mark.slow
 
@@ -35,8 +32,8 @@ RATE = 150.0
 
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
-    made = [recording_with_truth(f"grasp-{seed}", seed) for seed in range(2)]
-    return scan_corpus("main", save_all(tmp_path_factory.mktemp("slips") / "main", made))
+    folder = tmp_path_factory.mktemp("slips")
+    return corpora_of(folder, {"main": range(2)}, recording_with_truth)["main"]
 
 
 @pytest.fixture(scope="module")
@@ -44,20 +41,16 @@ def recordings(corpus):
     return corpus_features(METHODS["difference"], corpus)
 
 
-def inside(times, spans):
-    return np.any([(times >= a - 1e-9) & (times < b - 1e-9) for a, b in spans], axis=0)
-
-
 def test_the_truth_is_that_of_each_finger(recordings):
     truth = recordings[0].slips
     times = recordings[0].times["thumb"]
-    np.testing.assert_array_equal(truth["thumb"].codes == SLIDING, inside(times, SLIPS))
+    np.testing.assert_array_equal(truth["thumb"].codes == SLIDING, inside(SLIPS, times))
     assert not (truth["index"].codes == SLIDING).any()
     assert [len(truth[name].slips) for name in ("thumb", "index")] == [len(SLIPS), 0]
-    held = inside(times, [(2.3, 9.5)])
+    held = inside([(2.3, 9.5)], times)
     np.testing.assert_array_equal(truth["index"].codes == STILL, held)
-    assert truth["index"].quiet[held & inside(times, [(3.0, 5.0)])].all()
-    assert not truth["index"].quiet[inside(times, [(5.4, 6.4)])].any()
+    assert truth["index"].quiet[held & inside([(3.0, 5.0)], times)].all()
+    assert not truth["index"].quiet[inside([(5.4, 6.4)], times)].any()
 
 
 def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
@@ -73,8 +66,8 @@ def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
 def test_a_hand_slides_if_one_of_its_fingers_slides(recordings):
     labels = recordings[0].slip_labels(HAND)
     times = recordings[0].times["thumb"]
-    np.testing.assert_array_equal(labels == UNSTABLE, inside(times, SLIPS))
-    assert ((labels == UNKNOWN) == ~inside(times, [(2.3, 9.5)])).all()
+    np.testing.assert_array_equal(labels == UNSTABLE, inside(SLIPS, times))
+    assert ((labels == UNKNOWN) == ~inside([(2.3, 9.5)], times)).all()
 
 
 def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
@@ -84,12 +77,6 @@ def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
     assert (~thumb.positive).sum() == n_sliding
     assert 100 < thumb.positive.sum() <= 200
     assert training.samples["index"].one_class
-
-
-def test_a_finger_without_known_slips_does_not_train(recordings):
-    without = [replace(r, slips={"thumb": r.slips["thumb"]}) for r in recordings]
-    training = MethodTraining.of(METHODS["difference"], without, 200, sliding=True)
-    assert list(training.samples) == ["thumb"]
 
 
 def test_scores_are_smoothed_as_by_the_rule_of_a_model():
@@ -156,12 +143,7 @@ EFFORT = EvaluationEffort(folds=2, inner=2, max_samples=500)
 def corpora(tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluate-slips")
     seeds = {"main": range(4), "others": range(10, 12)}
-    return {
-        name: scan_corpus(
-            name, save_all(folder / name, [recording_with_truth(f"grasp-{s}", s) for s in each])
-        )
-        for name, each in seeds.items()
-    }
+    return corpora_of(folder, seeds, recording_with_truth)
 
 
 def job(name, main, tests=(), compared=()):
@@ -233,10 +215,3 @@ def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypat
     assert strict.quiet_budget.pooled.incipient["0.1"] == 0.0
     assert strict.quiet_budget.pooled.false_alarms_per_minute["quiet"] == 0.0
     assert strict.quiet_budget.intervals != strict.summary.intervals
-
-
-def test_every_method_can_be_found_and_has_a_title_of_its_own():
-    titles = [(m.target, m.method.title) for m in SLIP_METHODS.values()]
-    assert len(set(titles)) == len(titles)
-    assert np.all([name == SLIP_METHODS[name].method.name for name in SLIP_METHODS
-                   if SLIP_METHODS[name].target == "sliding"])  # fmt: skip

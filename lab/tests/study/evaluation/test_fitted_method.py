@@ -103,29 +103,6 @@ def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
         assert np.isfinite(samples.features).all()
 
 
-def test_a_fit_does_not_depend_on_other_recordings(corpus):
-    method = METHODS["logreg"]
-    recordings = corpus_features(method, corpus)
-    other = [*recordings[:3], scrambled(recordings[3])]
-    fitted_methods = [
-        MethodTraining.of(method, each).fit({0, 1, 2}) for each in (recordings, other)
-    ]
-    assert fitted_methods[0].classifiers == fitted_methods[1].classifiers
-    assert fitted_methods[0].contact_thresholds == fitted_methods[1].contact_thresholds
-    late = [MethodTraining.of(method, each).fit({1, 2, 3}) for each in (recordings, other)]
-    assert late[0].classifiers != late[1].classifiers
-
-
-def scrambled(recording):
-    generator = np.random.default_rng(9)
-    labels = {f: generator.permutation(codes) for f, codes in recording.labels.items()}
-    features = {u: 7 * generator.permutation(rows) for u, rows in recording.features.items()}
-    at_rest = {f: (n, 3 * a, 9 * b) for f, (n, a, b) in recording.at_rest.items()}
-    return replace(
-        recording, labels=labels, exact_labels=labels, features=features, at_rest=at_rest
-    )
-
-
 def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus)
@@ -152,15 +129,8 @@ def without(recording, finger):
     def rest(each):
         return {name: value for name, value in each.items() if name != finger}
 
-    return replace(
-        recording,
-        times=rest(recording.times),
-        amplitude=rest(recording.amplitude),
-        labels=rest(recording.labels),
-        exact_labels=rest(recording.exact_labels),
-        at_rest=rest(recording.at_rest),
-        features=rest(recording.features),
-    )
+    names = ("times", "amplitude", "labels", "exact_labels", "at_rest", "features")
+    return replace(recording, **{name: rest(getattr(recording, name)) for name in names})
 
 
 def test_one_class_gives_no_classifier_and_no_scores(corpus):
@@ -187,20 +157,10 @@ def hand_scores(margin, known=None, grasped=None, rate=100.0):
     )
 
 
-def test_an_unstable_sample_is_held():
-    found = hand_scores([1, 1, -1, 1, 1, 1, 1, 1]).hold(0.03).states()
-    assert found.tolist() == [STABLE] * 2 + [UNSTABLE] * 3 + [STABLE] * 3
-
-
 def test_no_state_is_held_without_a_grasped_object_or_with_an_unknown_finger():
     grasped, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
     found = hand_scores([1, 1, -1, np.inf, 1, 1], known, grasped).hold(0.04).states()
     assert found.tolist() == [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, UNSTABLE]
-
-
-def test_a_hold_time_of_zero_changes_nothing():
-    bare = hand_scores([1, -1, 1, -1, 1])
-    assert bare.hold(0.0).states().tolist() == bare.states().tolist()
 
 
 @pytest.mark.parametrize("shift", [-0.5, 0.0, 0.5])

@@ -7,9 +7,8 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast_lab.study.evaluation.held_object import count_glitches, held_errors
 from holdfast_lab.study.methods import HAND
-from study.example_recordings import GLITCH, truth_of
+from study.example_recordings import GLITCH, TIMES, inside, truth_of
 
-TIMES = np.arange(1725) / 150
 GROUND_TRUTH = truth_of(TIMES, ("thumb", "index"))
 LABELS = np.where((TIMES >= 2.3) & (TIMES < 9.5), STABLE, UNSTABLE)
 LABELS = np.where((TIMES >= 5.3 - 1e-9) & (TIMES < 6.5), UNSTABLE, LABELS).astype(np.int8)
@@ -32,9 +31,7 @@ def test_errors_count_while_the_object_is_held(names, n):
 
 def sliding(*spans, speed=0.01):
     """Return the truth with sliding on the index alone, at other times [s] and speeds [m/s]."""
-    given = np.zeros(len(TIMES))
-    for start, end in spans:
-        given[(start - 1e-9 <= TIMES) & (end - 1e-9 > TIMES)] = speed
+    given = speed * inside(spans)
     fingers = {name: dict(arrays) for name, arrays in GROUND_TRUTH.fingers.items()}
     fingers["thumb"]["slip_speed"] = np.zeros(len(TIMES))
     fingers["index"]["slip_speed"] = given

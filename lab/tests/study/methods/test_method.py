@@ -29,19 +29,6 @@ def test_features_restart_at_each_stretch():
     np.testing.assert_array_equal(found["index"][:, 0], wanted)
 
 
-def test_a_finger_without_a_stretch_has_the_same_number_of_features():
-    hand = pressed(np.full((4, 3), np.nan))
-    found = stretchwise(hand, lambda finger: finger.force[:, :2])
-    assert found["index"].shape == (4, 2)
-    assert np.isnan(found["index"]).all()
-
-
-def test_normal_and_tangential():
-    finger = pressed([[3, 4, -10]]).fingers["index"]
-    assert (finger.normal_force[0], finger.normal_magnitude[0]) == (-10, 10)
-    assert finger.tangential_magnitude[0] == 5
-
-
 @pytest.mark.parametrize(("unit", "newton"), [("N", 1.0), ("count", 1 / 0.000729)])
 def test_a_newton_in_the_unit_of_the_readings(unit, newton):
     finger = pressed([[0, 0, 0]], unit=unit).fingers["index"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.features import FEATURE_NAMES, Tare, haar_features
-from holdfast_lab.study.methods import METHODS, PAPER_FAMILY, hand_signal
+from holdfast_lab.study.methods import METHODS, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy, normal_energy
 from training.build import tiny_recording
 
@@ -23,14 +23,6 @@ def test_energy_by_hand():
     np.testing.assert_allclose(found[:, 0], [NAN, NAN, NAN, 2.5, 8.0, 0.5])
 
 
-def test_the_deployed_window_has_seven_pairs():
-    # 0, 2, 0, 2, ... : every detail is -sqrt(2) or sqrt(2), so E = 7 x 2.
-    hand = pressed(along_normal([0, 2] * 10))
-    found = METHODS["zhang"].features(hand)["index"][:, 0]
-    assert np.isnan(found[:13]).all()
-    np.testing.assert_allclose(found[13:], 14.0)
-
-
 def test_energy_does_not_depend_on_shear():
     values = along_normal(np.arange(30.0) ** 2)
     sheared = values + np.outer(np.arange(30) % 7, [1.0, -2.0, 0.0])
@@ -45,29 +37,6 @@ def test_energy_is_spread_and_mean_of_the_details():
     steps = [(values[k - 13 : k + 1 : 2] - values[k - 12 : k + 1 : 2]) for k in range(13, 200)]
     means = np.sum(steps, axis=1) / np.sqrt(2) / 7
     np.testing.assert_allclose(detail_energy(values)[13:], 14 * sigma[13:] ** 2 + 7 * means**2)
-
-
-def test_an_odd_window_is_refused():
-    with pytest.raises(ValueError, match="an even window of at least 2 samples expected, 5 given"):
-        detail_energy(np.ones(9), window=5)
-
-
-def test_trees_have_the_six_features_of_the_paper():
-    hand = hand_signal(tiny_recording(0), Tare.parse("0.5"))
-    found = METHODS["trees"].features(hand)
-    assert list(found) == ["thumb", "index"]
-    for name, rows in found.items():
-        force = hand.fingers[name].force
-        known = np.isfinite(force).all(axis=1)
-        assert rows.shape == (len(force), len(FEATURE_NAMES))
-        assert np.array_equal(rows[known], haar_features(force[known], 14), equal_nan=True)
-        assert np.isnan(rows[~known]).all()
-
-
-def test_description_of_the_trees():
-    method = METHODS["trees"]
-    assert (method.name, method.category, method.recipe.name) == ("trees", "learning", "trees")
-    assert not method.whole_hand
 
 
 def test_two_features_on_logarithmic_scales():
@@ -117,16 +86,3 @@ def test_the_energy_keeps_the_mean_of_the_details():
     assert energy == pytest.approx(np.full(17, np.log10(31.5)))
     sigma = METHODS["log_two"].features(hand)["index"][13:, 1]
     assert (sigma < -5).all()
-
-
-def test_the_classifiers_of_the_paper_with_and_without_class_weights():
-    for name in ("logreg", "svm"):
-        balanced, unweighted = METHODS[name], METHODS[f"{name}_unweighted"]
-        assert balanced.reference == {"C": 1.0, "class_weight": "balanced"}
-        assert unweighted.reference == {"C": 1.0, "class_weight": None}
-        assert balanced.features is unweighted.features
-        assert balanced.recipe is unweighted.recipe
-    assert PAPER_FAMILY == (
-        "logreg", "logreg_unweighted", "svm", "svm_unweighted", "log_two", "log_hand",
-        "energy",
-    )  # fmt: skip

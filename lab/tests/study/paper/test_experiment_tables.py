@@ -10,19 +10,17 @@ from holdfast.recordings import Truth
 from holdfast_lab.study.paper import experiment_tables
 from holdfast_lab.study.paper.experiment_tables import find_disturbances, stable_after_lock
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from study.example_recordings import recording_with_truth, save_all, truth_of
+from study.example_recordings import TIMES, inside, recording_with_truth, save_all, truth_of
 
 pytestmark = pytest.mark.slow
 
-TIMES = np.arange(1725) / 150
 TRUTH = truth_of(TIMES, ("thumb", "index"))
 """Locked at 2.3 s, disturbed from 5.3 to 6.5 s, released at 9.5 s."""
 
 
 def states(*spans, state=UNSTABLE):
     """Stable, but in those spans [s] another state."""
-    inside = np.any([(a - 1e-9 <= TIMES) & (b - 1e-9 > TIMES) for a, b in spans], axis=0)
-    return np.where(inside, state, STABLE).astype(np.int8)
+    return np.where(inside(spans), state, STABLE).astype(np.int8)
 
 
 def hand(codes):
@@ -46,32 +44,24 @@ class TestStableAfterLock:
         assert stable_after_lock(TIMES, states(), None) is None
 
 
-class TestDisturbances:
-    def one(self, codes):
-        (found,) = find_disturbances(hand(codes), TRUTH)
-        assert (found.start, found.end) == pytest.approx((5.3, 6.5 - 1 / 150), abs=0.007)
-        return found
+LATE = pytest.approx(0.1, abs=0.007)
 
-    def test_an_alarm_inside_detects_it(self):
-        found = self.one(states((5.4, 5.6)))
-        assert found.was_stable and found.delay == pytest.approx(0.1, abs=0.007)
 
-    def test_without_an_alarm_it_is_missed_even_if_called_unstable_all_along(self):
-        found = self.one(states((5.0, 7.0)))
-        assert not found.was_stable and found.delay == math.inf
-
-    def test_alarms_before_and_after_do_not_count(self):
-        assert self.one(states((5.2, 5.25), (6.6, 6.8))).delay == math.inf
-
-    def test_an_alarm_after_a_false_one_counts(self):
-        found = self.one(states((5.2, 5.5), (6.0, 6.1)))
-        assert not found.was_stable and found.delay == pytest.approx(0.7, abs=0.007)
-
-    def test_an_unknown_state_is_no_alarm(self):
-        assert self.one(states((5.4, 5.6), state=UNKNOWN)).delay == math.inf
-
-    def test_a_lost_contact_is_an_alarm(self):
-        assert self.one(states((5.4, 5.6), state=NO_CONTACT)).delay < 0.2
+@pytest.mark.parametrize(
+    ("spans", "state", "was_stable", "delay"),
+    [
+        ([(5.4, 5.6)], UNSTABLE, True, LATE),
+        ([(5.4, 5.6)], NO_CONTACT, True, LATE),
+        ([(5.4, 5.6)], UNKNOWN, True, math.inf),
+        ([(5.0, 7.0)], UNSTABLE, False, math.inf),  # unstable all along: no alarm
+        ([(5.2, 5.25), (6.6, 6.8)], UNSTABLE, True, math.inf),  # before and after it
+        ([(5.2, 5.5), (6.0, 6.1)], UNSTABLE, False, pytest.approx(0.7, abs=0.007)),
+    ],
+)
+def test_an_alarm_inside_a_disturbance_detects_it(spans, state, was_stable, delay):
+    (found,) = find_disturbances(hand(states(*spans, state=state)), TRUTH)
+    assert (found.start, found.end) == pytest.approx((5.3, 6.5 - 1 / 150), abs=0.007)
+    assert (found.was_stable, found.delay) == (was_stable, delay)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from holdfast.contact import ContactState
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper import experiments
 from holdfast_lab.study.plan import scan_corpus
-from study.example_recordings import recordings_of_cases, save_all, save_synthetic
+from study.example_recordings import recordings_of_cases, save_all
 
 pytestmark = pytest.mark.slow
 
@@ -40,12 +40,3 @@ def test_a_recording_is_predicted_by_fits_without_it(tmp_path):
         found.append(experiments.predict_examples({"main": main}, "index", 0)[1])
     assert found[0].recording == "2-0"
     assert found[0] == found[1]
-
-
-def test_without_cases_the_first_recording_is_shown(tmp_path):
-    main = scan_corpus("main", save_synthetic(tmp_path / "a", range(2)))
-    shown = experiments.predict_examples({"main": main}, "index", 0)
-    assert [(s.experiment, s.recording) for s in shown] == [
-        ("protocol", "grasp-0"),
-        ("any", "grasp-0"),
-    ]

@@ -52,12 +52,6 @@ def test_parts_are_drawn_by_the_seed(corpus):
     assert share == pytest.approx(np.full(25, 0.04), abs=0.015)
 
 
-def test_select_returns_the_features_in_the_given_order(corpus):
-    pool = pool_samples(corpus, corpus.rate, "index", 4, seed=0)
-    few = pool.select(["sigma", "F_a"]).features
-    assert np.array_equal(few, pool.samples.features[:, [5, 0]])
-
-
 def test_a_recording_without_the_finger_has_no_samples(tmp_path):
     fingers = (["thumb", "index"], ["thumb"], ["thumb", "index"])
     recordings = [synthetic_recording(f"r{k}", k, names) for k, names in enumerate(fingers)]

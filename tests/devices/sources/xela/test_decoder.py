@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 
 from holdfast.contact import Fault
 from holdfast.devices.sources.xela.decoder import XelaDecoder
-from holdfast.devices.sources.xela.packet import InvalidPacket
 from holdfast.errors import SourceError
 from holdfast.sensors import hand
 
-from .build import NEW, OLD, PERIOD, START, WELCOME, counts, patch, sensor, text
+from .build import NEW, PERIOD, START, counts, patch, sensor, text
 
 
 def taught(first, **options):
@@ -44,13 +43,6 @@ class TestSamples:
             assert (arrival.faults, arrival.n_lost, arrival.n_refused) == ({}, 0, 0)
             assert arrival.notices == ()
 
-    @pytest.mark.parametrize("first", [OLD, NEW])
-    def test_both_versions(self, first):
-        (arrival,) = taught(first).decode(first, 5.0)
-        fields = json.loads(first)
-        assert arrival.time == fields["1"].get("time", fields["time"])
-        assert arrival.received == 5.0
-
     def test_real_packets(self, real_packets):
         for whole in real_packets.values():
             decoder = taught(whole)
@@ -65,15 +57,6 @@ class TestSamples:
                 for name, expected in skin.split(flat).items():
                     np.testing.assert_array_equal(samples[name], expected)
 
-    def test_real_newtons(self, real_packets):
-        decoder = taught(real_packets["uSPa46"], calibrated=True)
-        arrivals = decoder.decode(real_packets["uSPa46"], 0.0)
-        fields = json.loads(real_packets["uSPa46"])
-        samples = {name: s for a in arrivals for name, s in a.samples.items()}
-        for number in (1, 2):
-            expected = np.reshape(fields[str(number)]["calibrated"], (24, 3))
-            np.testing.assert_array_equal(samples[f"finger{number}"], expected)
-
     def test_a_whole_hand(self):
         allegro, readings = hand("allegro-uskin"), counts(368)
         packet = text(1, [sensor(readings, "XR23AHRCPP")])
@@ -83,44 +66,8 @@ class TestSamples:
             np.testing.assert_array_equal(arrival.samples[name], expected)
         assert decoder.metadata == {"models": {"1": "XR23AHRCPP"}, "hand": "allegro-uskin"}
 
-    def test_samples_are_fresh(self):
-        packet = text(1, [sensor(counts(368), "XR23AHRCPP")])
-        decoder = taught(packet)
-        (first,) = decoder.decode(packet, 0.0)
-        (second,) = decoder.decode(text(2, [sensor(counts(368), "XR23AHRCPP")]), 0.0)
-        for name in first.samples:
-            assert not np.shares_memory(first.samples[name], second.samples[name])
-
 
 class TestLearning:
-    @pytest.mark.parametrize("packet", [WELCOME, '{"message": "error", "data": []}'])
-    def test_a_packet_without_samples_identifies_nothing(self, packet):
-        decoder = XelaDecoder()
-        assert not decoder.identify(packet)
-        assert decoder.sensors == {}
-
-    def test_metadata_of_the_server(self):
-        decoder = taught(NEW, names={1: "thumb"})
-        assert list(decoder.sensors) == ["thumb"]
-        assert decoder.metadata == {
-            "models": {"1": "uSPa11"},
-            "server_version": "1.8.0b_200801",
-        }
-
-    @pytest.mark.parametrize(
-        ("packet", "message"),
-        [
-            ("?", "malformed"),
-            (text(1, []), "it has no sensors"),
-            (text(1, [{"model": "uSPa44"}]), "sensor 1: it has no readings"),
-            (text(1, [sensor(counts(16), taxels=15)]), "announces 15 taxels and sends 16"),
-            (text(1, [sensor(counts(16)), sensor(counts(16), data="?")]), "sensor 2: "),
-        ],
-    )
-    def test_invalid_packets(self, packet, message):
-        with pytest.raises(InvalidPacket, match=message):
-            XelaDecoder().identify(packet)
-
     @pytest.mark.parametrize("calibrated", [None, []])
     def test_without_newtons(self, calibrated):
         packet = text(1, {3: sensor(counts(16), calibrated=calibrated)})
@@ -159,15 +106,6 @@ class TestCounter:
         packets = [patch(k) for k in (0, 1, 4, 5, 6, 16)]
         assert [a.n_lost for a in fed(taught(packets[0]), packets)] == [0, 0, 2, 0, 0, 9]
 
-    @pytest.mark.parametrize("reported", [True, False])
-    def test_a_restart_loses_nothing(self, reported):
-        decoder = taught(patch(5000))
-        fed(decoder, [patch(5000)])
-        if reported:
-            decoder.reconnected()
-        arrivals = fed(decoder, [patch(5001, message=0), patch(5002, message=1)], 100.01)
-        assert [a.n_lost for a in arrivals] == [0, 0]
-
 
 class TestTimes:
     def test_sensors_with_stamps_of_their_own_arrive_at_instants_of_their_own(self):
@@ -178,45 +116,6 @@ class TestTimes:
         assert [a.time for a in arrivals] == expected
         assert {a.received for a in arrivals[:2]} == {100.0}
         assert not any(a.faults for a in arrivals)
-
-    def test_a_sensor_that_lags_is_timed_after_the_others(self):
-        packets = [text(k, [own(k), own(k, lag=0.3)]) for k in range(50)]
-        arrivals = fed(taught(packets[0]), packets)
-        times = [a.time for a in arrivals]
-        assert all(np.diff(times) > 0)
-        assert not any(a.faults for a in arrivals)
-        late = [a.time for a in arrivals if "finger2" in a.samples]
-        np.testing.assert_allclose(np.diff(late)[1:], PERIOD, atol=1e-5)
-        first = [a.time for a in arrivals if "finger1" in a.samples]
-        assert first == [START + k * PERIOD for k in range(50)]
-
-    def test_a_sensor_that_begins_to_lag_is_late(self):
-        packets = [text(k, [own(k), own(k, lag=0.2 if k >= 5 else 0.0)]) for k in range(10)]
-        arrivals = fed(taught(packets[0]), packets)
-        late = [a.faults for a in arrivals if a.faults]
-        assert late == [{"finger2": (Fault.LATE,)}] * 5
-
-    @pytest.mark.parametrize("jump", [-3600.0, -0.2, 3600.0])
-    @pytest.mark.parametrize("has_own", [False, True])
-    def test_time_goes_on_where_the_clock_jumps(self, jump, has_own):
-        def packet(k):
-            moved = jump if k >= 10 else 0.0
-            one = sensor(counts(16, k), time=START + k * PERIOD + moved if has_own else None)
-            return text(k, [one], time=START + k * PERIOD + moved)
-
-        arrivals = fed(taught(packet(0)), [packet(k) for k in range(20)])
-        times = np.array([a.time for a in arrivals])
-        np.testing.assert_allclose(times, START + np.arange(20) * PERIOD, atol=1e-5)
-        assert [a.faults for a in arrivals[:10] + arrivals[11:]] == [{}] * 19
-        assert arrivals[10].faults == {"finger1": (Fault.CLOCK_JUMP,)}
-
-    def test_time_goes_on_over_a_restart(self):
-        decoder = taught(patch(0))
-        fed(decoder, [patch(k) for k in range(10)])
-        decoder.reconnected()
-        later = fed(decoder, [patch(k, message=k - 500) for k in range(500, 510)], 105.0)
-        assert [a.time for a in later] == [START + k * PERIOD for k in range(500, 510)]
-        assert not any(a.faults for a in later)
 
 
 class TestRefusals:

@@ -25,12 +25,6 @@ def test_a_model_without_a_layout_is_flat_and_gives_a_notice(model):
     assert "sensor=FILE.json" in device.notices[0]
 
 
-def test_without_a_model():
-    device = xela_devices({1: ("", 2)}, {})[1]
-    assert device.modules["finger1"].name == "unknown"
-    assert "a sensor without a model" in device.notices[0]
-
-
 @pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "uskin-curved"])
 def test_without_a_model_but_with_the_taxels_of_a_built_in_sensor(name):
     device = xela_devices({1: ("", sensor(name).n_taxels)}, {})[1]

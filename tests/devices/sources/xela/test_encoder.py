@@ -15,7 +15,7 @@ from holdfast.devices.sources.xela.encoder import (
     SampleBatcher,
     XelaEncoder,
 )
-from holdfast.sensors import Sensor, hand, sensor
+from holdfast.sensors import hand, sensor
 from holdfast.sensors.xela_models import flat_grid
 
 from .build import START, counts
@@ -93,21 +93,6 @@ def test_fields_of_1_8_are_those_of_a_real_server(model, sensors, real_packets):
         if isinstance(value, list | str) and field not in ("model", "handedness"):
             assert len(packet["1"][field]) == len(value)
     assert packet["1"]["model"].lower() == real["1"]["model"].lower()
-
-
-def test_fields_of_1_8():
-    encoder = XelaEncoder({"thumb": newtons()}, version="1.8")
-    packet = parsed(encoder, {"thumb": np.zeros((16, 3))})
-    assert list(packet) == ["message", "time", "sensors", "type", "version", "1", "sendtime"]
-    assert list(packet["1"]) == [
-        "time", "sensor", "data", "model", "taxels",
-        "calibrated", "integer", "temp", "handedness", "ups",
-    ]  # fmt: skip
-    assert (packet["type"], packet["sendtime"], packet["1"]["time"]) == (
-        "routine",
-        START + 1,
-        START,
-    )
 
 
 def test_the_first_message_is_welcome():
@@ -211,21 +196,6 @@ class TestReadings:
         assert np.abs(errors[known]).max() <= 0.5
         assert counted.samples["a"][2, 1] == REST_READING[1]
 
-    def test_another_shape(self):
-        with pytest.raises(ValueError, match=r"\(15, 3\)"):
-            XelaEncoder({"a": sensor("uskin-4x4")}).packet({"a": np.zeros((15, 3))}, 0.0, 0.0)
-
-
-def test_a_sensor_unknown_to_xela_keeps_its_name():
-    own = Sensor("mine", np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.array([0, 0, 1]), 50.0)
-    packet = parsed(XelaEncoder({"a": own}), {"a": np.zeros((2, 3))})
-    assert (packet["1"]["model"], packet["1"]["ups"]) == ("mine", [50.0, 50.0])
-
-
-def test_an_unknown_version():
-    with pytest.raises(ValueError, match=r"2\.0"):
-        XelaEncoder(TIPS, version="2.0")
-
 
 def batches(batcher, given):
     """Time of each batch, and the samples of its modules with their times."""
@@ -234,11 +204,20 @@ def batches(batcher, given):
     return [(one.time, {n: (s, one.times[n]) for n, s in one.samples.items()}) for one in due]
 
 
-def test_one_instant_is_one_batch():
-    given = [(t, {"a": 10 + t, "b": 20 + t}) for t in range(3)]
-    expected = [(t, {"a": (10 + t, t), "b": (20 + t, t)}) for t in range(3)]
-    for own_stamps in (False, True):
-        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == expected
+LATE = MAX_MODULE_WAIT + 0.1
+TOGETHER = [(t, {"a": 10 + t, "b": 20 + t}) for t in range(3)]
+TOGETHER_BATCHES = [(t, {"a": (10 + t, t), "b": (20 + t, t)}) for t in range(3)]
+ALONE = [(t, {"a": t}) for t in (0.0, 0.9 * MAX_MODULE_WAIT, MAX_MODULE_WAIT, LATE)]
+ALONE_BATCHES = [(t, {"a": (t, t)}) for t in (MAX_MODULE_WAIT, LATE)]
+
+
+@pytest.mark.parametrize("own_stamps", [False, True])
+@pytest.mark.parametrize(
+    ("given", "expected"), [(TOGETHER, TOGETHER_BATCHES), (ALONE, ALONE_BATCHES)]
+)
+def test_samples_of_an_instant_and_of_one_module_are_batches(own_stamps, given, expected):
+    """A module that never arrives is waited for once."""
+    assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == expected
 
 
 def test_with_own_stamps_every_sample_is_passed_on_at_once():
@@ -266,17 +245,6 @@ def test_a_module_with_its_next_sample_does_not_wait():
         (0.1, {"a": (3, 0.1), "b": (2, 0.0)}),
         (0.2, {"a": (4, 0.2), "b": (2, 0.0)}),
     ]
-
-
-def test_a_module_that_never_arrives_is_waited_for_once():
-    for own_stamps in (False, True):
-        given = [
-            (t, {"a": t})
-            for t in (0.0, 0.9 * MAX_MODULE_WAIT, MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
-        ]
-        assert batches(SampleBatcher("ab", own_stamps=own_stamps), given) == [
-            (t, {"a": (t, t)}) for t in (MAX_MODULE_WAIT, MAX_MODULE_WAIT + 0.1)
-        ]
 
 
 def test_a_module_that_arrives_late_is_passed_on_from_then():

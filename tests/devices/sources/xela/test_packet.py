@@ -94,13 +94,6 @@ def test_without_readings(part):
     assert readings(part) is None
 
 
-def test_readings_are_fresh_and_native():
-    raw = read_packet(OLD).sensors[1]
-    first, second = (read_sensor(raw, calibrated=False).readings() for _ in range(2))
-    assert not np.shares_memory(first, second)
-    assert first.dtype.isnative
-
-
 def test_what_is_not_finite_is_missing():
     given = (
         '{"message": 1, "time": 2.0, "1": {"calibrated": [NaN, 0, -Infinity, 1.5, null, -2], '

@@ -4,7 +4,7 @@ import socket
 import pytest
 
 from holdfast.devices.sources.xela import places as module
-from holdfast.devices.sources.xela.places import Place, places
+from holdfast.devices.sources.xela.places import places
 from holdfast.devices.uri import parse
 
 
@@ -40,12 +40,6 @@ def test_auto_without_another_address(monkeypatch, own):
     assert found("xela://auto") == ["127.0.0.1:5000"]
 
 
-def test_the_own_address_is_one_or_none():
-    own = module.own_address()
-    if own is not None:
-        socket.inet_aton(own)
-
-
 def test_without_a_default_route_there_is_no_own_address(monkeypatch):
     def refuse(*_):
         raise OSError("Network is unreachable")
@@ -67,7 +61,3 @@ def test_without_a_default_route_there_is_no_own_address(monkeypatch):
 def test_invalid_addresses(text):
     with pytest.raises(ValueError, match=re.escape(text)):
         found(text)
-
-
-def test_a_place_as_text():
-    assert (str(Place("a", 1)), str(Place("fe80::1", 2))) == ("a:1", "[fe80::1]:2")

@@ -7,13 +7,6 @@ from holdfast.devices.sources.xela.client import XelaSource
 from holdfast.sensors import sensor
 
 
-def test_a_uri_makes_a_source_and_does_not_connect():
-    source = open_source("xela://auto?values=calibrated&fingers=1:thumb&sensor=uskin-4x6")
-    assert isinstance(source, XelaSource)
-    assert source.name == "xela://auto?values=calibrated&fingers=1:thumb&sensor=uskin-4x6"
-    assert (source.paced, source.ended) == (True, False)
-
-
 def test_a_sensor_from_a_file(tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(sensor("uskin-4x4").to_dict()))
@@ -23,18 +16,13 @@ def test_a_sensor_from_a_file(tmp_path):
 @pytest.mark.parametrize(
     ("query", "text"),
     [
-        ("value=counts", "unknown parameter value; there are values, fingers, sensor"),
-        ("values=force", "values=counts or calibrated expected, 'force' given"),
-        ("fingers=thumb", "fingers=1:thumb,2:index expected, 'thumb' given"),
-        ("sensor=nothing", "sensor=FILE.json or one of uskin-curved, "),
+        ("value=counts", "unknown parameter value"),
+        ("values=force", "'force'"),
+        ("fingers=thumb", "'thumb'"),
+        ("sensor=nothing", "uskin-curved"),
+        ("sensor=/none/nothing.json", "nothing.json"),
     ],
 )
 def test_what_is_refused(query, text):
-    with pytest.raises(ValueError) as refusal:
+    with pytest.raises(ValueError, match=text):
         open_source(f"xela://auto?{query}")
-    assert str(refusal.value).startswith(f"xela://auto?{query}: {text}")
-
-
-def test_a_sensor_that_is_no_file(tmp_path):
-    with pytest.raises(ValueError, match=r"nothing\.json"):
-        open_source(f"xela://auto?sensor={tmp_path}/nothing.json")
