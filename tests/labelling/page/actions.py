@@ -1,6 +1,6 @@
 """Mouse, keyboard and waiting for tests of the labelling page."""
 
-import re
+from browser import DESKTOP, shows, until
 
 POSITION = """([finger, time, zone]) => {
   const { plot, view, editor } = holdfast, row = plot.rows[editor.fingers.indexOf(finger)];
@@ -10,32 +10,16 @@ POSITION = """([finger, time, zone]) => {
 }"""
 
 
-def until(page, script, arg=None):
-    """Wait until a script returns true.
-
-    `page.wait_for_function` uses `eval`, which the security policy of the page forbids.
-    """
-    for _ in range(600):
-        if page.evaluate(script, arg):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never true: {script} {arg}")
-
-
-def shows(page, selector, text):
-    """Wait until the text of the first matching element matches a pattern."""
-    for _ in range(600):
-        found = page.evaluate("(at) => document.querySelector(at)?.innerText ?? ''", selector)
-        if re.search(text, found):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"{selector} shows {found!r}, never {text!r}")
-
-
 def ready(page):
     """Wait until the signals are drawn and the change points are loaded."""
     until(page, "document.body.dataset.painted === '1'")
     until(page, "Object.keys(holdfast.plot.changePoints).length > 0")
+
+
+def opened(visit, service, size=DESKTOP, **options):
+    page = visit(service.url, size, **options)
+    ready(page)
+    return page
 
 
 def position(page, finger, time, zone="force"):

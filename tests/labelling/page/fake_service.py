@@ -1,22 +1,14 @@
-"""A fake service of the labelling page: its recordings are in memory, and a test controls it.
-
-To look at the page: `PYTHONPATH=tests python -m labelling.page.fake_service [PORT]`.
-"""
+"""A fake service of the labelling page: its recordings are in memory, and a test controls it."""
 
 import asyncio
-import contextlib
-import sys
-import threading
 from importlib import resources
 from pathlib import Path
 
 import numpy as np
 from aiohttp import web
 
-from holdfast.web.guard import SECURITY_HEADERS
+from browser import PageService
 
-PAGE = Path(str(resources.files("holdfast.labelling"))) / "page"
-SHARED = Path(str(resources.files("holdfast.web"))) / "static"
 SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0
@@ -119,12 +111,14 @@ class Recording:
         return {"start": start, "end": end, "exact": exact, "fingers": fingers}
 
 
-class FakeService:
-    """Fake service on its own port, in its own thread."""
+class FakeService(PageService):
+    """Fake service of recordings."""
+
+    folder = Path(str(resources.files("holdfast.labelling"))) / "page"
 
     def __init__(self, *recordings, port=0, media=None):
+        super().__init__(port)
         self.recordings = recordings or (Recording(),)
-        self.port = port
         self.media = media  # path of the file that is sent for every video
         self.saves = []  # bodies of the save requests
         self.requests = []  # (start, end, points) of the requests for signals
@@ -132,59 +126,18 @@ class FakeService:
         self.refusal = None  # (status, text) of the reply to every save
         self.delays = []  # delays of the next replies with signals [s]
 
-    def __enter__(self):
-        ready = threading.Event()
-        self.thread = threading.Thread(target=lambda: asyncio.run(self.run(ready)))
-        self.thread.start()
-        if not ready.wait(20):
-            raise RuntimeError("the fake service did not start")
-        return self
-
-    def __exit__(self, *_):
-        self.loop.call_soon_threadsafe(self.done.set)
-        self.thread.join(20)
-
-    @property
-    def url(self):
-        return f"http://127.0.0.1:{self.port}/"
-
-    async def run(self, ready):
-        self.loop, self.done = asyncio.get_running_loop(), asyncio.Event()
-        runner = web.AppRunner(self.app(), shutdown_timeout=0.2)
-        await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", self.port).start()
-        self.port = runner.addresses[0][1]
-        ready.set()
-        await self.done.wait()
-        await runner.cleanup()
-
-    def app(self):
-        app = web.Application(middlewares=[self.guard])
-        one = r"/api/v1/recordings/{id:\d+}"
-        app.router.add_static("/page", PAGE)
-        app.router.add_static("/web", SHARED)
-        app.router.add_get("/", self.index)
-        app.router.add_get("/api/v1/recordings", self.list)
-        app.router.add_get(one, self.open)
-        app.router.add_get(one + "/signals", self.signals)
-        app.router.add_get(one + "/changes", self.changes)
-        app.router.add_put(one + "/labels", self.save)
-        app.router.add_post(one + "/propose", self.propose)
-        app.router.add_get(r"/media/{id:\d+}/{index:\d+}", self.video)
-        return app
-
-    @web.middleware
-    async def guard(self, request, handler):
-        answer = await handler(request)
-        if not answer.prepared:
-            answer.headers.update(SECURITY_HEADERS)
-        return answer
+    def routes(self):
+        all_of_them = "/api/v1/recordings"
+        one = all_of_them + r"/{id:\d+}"
+        return [
+            ("GET", all_of_them, self.list), ("GET", one, self.open),
+            ("GET", one + "/signals", self.signals), ("GET", one + "/changes", self.changes),
+            ("PUT", one + "/labels", self.save), ("POST", one + "/propose", self.propose),
+            ("GET", r"/media/{id:\d+}/{index:\d+}", self.video),
+        ]  # fmt: skip
 
     def recording(self, request):
         return self.recordings[int(request.match_info["id"])]
-
-    async def index(self, _):
-        return web.FileResponse(PAGE / "index.html")
 
     async def list(self, _):
         entries = [each.entry(index) for index, each in enumerate(self.recordings)]
@@ -226,23 +179,3 @@ class FakeService:
         if self.media is None:
             return web.json_response({"error": "there is no such video"}, status=404)
         return web.FileResponse(self.media)
-
-
-def example_recording():
-    """Return a recording with labels, proposals and markers, to look at."""
-    shown = Recording("can-case2-1", markers=[(5.0, "closing"), (7.5, "locked")])
-    for finger in FINGERS:
-        shown.file["labels"][finger] = [label(0, 5, "no_contact"), label(5, 7.5, "unstable")]
-        shown.fields["proposals"][finger] = [
-            label(7.5, 14, "stable", confidence=0.95, author="rule:signal", evidence="settled"),
-            label(14, 16, "unstable", "disturbance", confidence=0.6, author="rule:signal"),
-        ]
-    return shown
-
-
-if __name__ == "__main__":
-    port = int(sys.argv[1]) if sys.argv[1:] else 8766
-    with FakeService(example_recording(), Recording("can-case2-2"), port=port) as service:
-        sys.stderr.write(f"{service.url}\n")
-        with contextlib.suppress(KeyboardInterrupt):
-            service.thread.join()

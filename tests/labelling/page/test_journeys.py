@@ -1,0 +1,405 @@
+"""What a person does on the labelling page, from opening it to having done it."""
+
+import numpy as np
+import pytest
+
+from browser import DESKTOP, HOSTILE, on_both, shows, until
+from holdfast.labelling.server.store import CAUSE_NAMES, STATE_NAMES
+from labelling.page.actions import (
+    click,
+    drag,
+    labels,
+    opened,
+    point,
+    position,
+    ready,
+    rounded,
+    saved,
+)
+from labelling.page.fake_service import FINGERS, FakeService, Recording, label
+from web.screens import flaws
+
+RULE = {"author": "rule:signal", "evidence": "grows"}
+CAUSES = {
+    "c": "closing",
+    "d": "disturbance",
+    "s": "slip",
+    "l": "lost",
+    "r": "released",
+    "k": "glitch",
+}
+SPAN = "[holdfast.view.start, holdfast.view.end]"
+
+
+@on_both
+def test_draw_a_label_change_it_undo_and_save(visit, service, size):
+    page = opened(visit, service, size)
+    drag(page, "index", 8, 16)
+    click(page, "index", 12, "labels")
+    page.click("#states button[data-value=unstable]")
+    page.click("#causes button[data-value=slip]")
+    ((start, end, *kind),) = labels(page, "index")
+    assert (start, end) == pytest.approx((8, 16), abs=1.5)  # edges snap to change points
+    assert kind == ["unstable", "slip"]
+    for n_labels, state in ((1, "unstable"), (1, "stable"), (0, None)):
+        page.click("#undo")
+        assert [each[2] for each in labels(page, "index")] == [state] * n_labels
+    assert page.locator("#undo").is_disabled()
+    for _ in range(3):
+        page.click("#redo")
+    saved(page)
+    by_hand = {"evidence": "hand", "confidence": 1, "author": "ada"}
+    own = {finger: [] for finger in FINGERS}
+    own["index"] = [label(start, end, "unstable", "slip", **by_hand)]
+    sent = service.saves[-1]
+    assert sent == {"labels": own, "note": "", "author": "ada", "revision": sent["revision"]}
+    assert flaws(page, size) == []
+    page.reload()
+    ready(page)
+    assert labels(page, "index") == [(start, end, "unstable", "slip")]
+    click(page, "index", 12, "labels")
+    page.click("#remove")
+    assert labels(page, "index") == []
+
+
+def test_draw_and_zoom_with_the_fingers_on_a_phone(visit, service):
+    page = opened(visit, service, (390, 844), has_touch=True)
+    touch = page.context.new_cdp_session(page)
+
+    def send(kind, *points):
+        places = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+
+    page.locator("#cursor-canvas").scroll_into_view_if_needed()
+    page.touchscreen.tap(*position(page, "thumb", 10))
+    assert labels(page) == []
+    for kind, time in (("touchStart", 8), ("touchMove", 12), ("touchMove", 16)):
+        send(kind, position(page, "index", time))
+    send("touchEnd")
+    assert len(labels(page, "index")) == 1
+    (x, y), right = position(page, "thumb", 14), position(page, "thumb", 18)
+    send("touchStart", (x, y))
+    send("touchStart", (x, y), right)
+    send("touchMove", (x - 40, y), (right[0] + 40, y))
+    send("touchEnd")
+    assert page.evaluate("holdfast.view.span") < 20
+    assert labels(page) == []
+
+
+def test_label_all_fingers_and_move_edges(visit, service):
+    service.recordings[0].save({"thumb": [label(4, 20, "stable", author="eve", evidence="seen")]})
+    (change, *_) = [each for each in service.recordings[0].changes["thumb"] if each > 11.5]
+    page = opened(visit, service)
+    page.keyboard.press("2")
+    drag(page, "thumb", 10, 11)  # a new label overwrites others
+    parts = [(4, 10, "stable", None), (10, 11, "unstable", None), (11, 20, "stable", None)]
+    assert rounded(labels(page)) == parts
+    drag(page, "thumb", 11, change + 0.1, zone="labels")  # an edge snaps to a change point
+    assert labels(page)[1][1] == labels(page)[2][0] == change
+    drag(page, "thumb", change, change + 0.25, zone="labels", keys=["Alt"])
+    (moved,) = {labels(page)[1][1], labels(page)[2][0]}
+    assert 0.15 < moved - change < 0.35
+    saved(page)
+    authors = [each["author"] for each in service.saves[-1]["labels"]["thumb"]]
+    assert authors == ["eve", "ada", "eve"]
+    drag(page, "ring", 22, 24)
+    page.keyboard.press("a")
+    assert [len(labels(page, finger)) for finger in FINGERS] == [4, 1, 1, 1]
+    page.keyboard.press("Control+z")
+    assert [len(labels(page, finger)) for finger in FINGERS] == [3, 0, 0, 1]
+    drag(page, "index", 26, 28, keys=["Control"])
+    assert [len(labels(page, finger)) for finger in FINGERS] == [4, 1, 1, 2]
+
+
+def test_label_with_the_keyboard(visit, service):
+    service.recordings[0].save({"thumb": [label(5, 9, "stable")]})
+    page = opened(visit, service)
+    page.keyboard.press("?")
+    page.keyboard.press("3")  # keys do nothing behind the help
+    page.keyboard.press("Escape")
+    assert page.evaluate("holdfast.editor.nextKind.state") == "stable"
+    page.keyboard.press("3")  # of the next label
+    assert rounded(labels(page)) == [(5, 9, "stable", None)]
+    click(page, "thumb", 7)
+    for key, cause in CAUSES.items():
+        page.keyboard.press(key)  # a cause makes a stable label unstable
+        assert labels(page) == [(5, 9, "unstable", cause)]
+    assert set(CAUSES.values()) == set(CAUSE_NAMES)
+    page.keyboard.press("k")  # the same cause again removes it
+    assert labels(page) == [(5, 9, "unstable", None)]
+    for key, state in zip("123", STATE_NAMES, strict=True):
+        page.keyboard.press(key)
+        assert labels(page) == [(5, 9, state, None)]
+    page.keyboard.press("Escape")
+    drag(page, "thumb", 20, 22)
+    click(page, "thumb", 7)
+    page.keyboard.press("Delete")
+    assert rounded(labels(page)) == [(20, 22, "no_contact", None)]
+    page.keyboard.press("e")
+    page.keyboard.type("1 good grasp")  # letters are no shortcuts here
+    page.keyboard.press("Escape")
+    saved(page)
+    assert service.saves[-1]["note"] == "1 good grasp"
+    page.keyboard.press("Control+z")
+    assert page.locator("#note").input_value() == ""
+
+
+def test_accept_and_reject_proposals(visit, service):
+    service.recordings[0].fields["proposals"] = {
+        "thumb": [
+            label(5, 7, "unstable", "closing", confidence=0.9, **RULE),
+            label(7, 9, "stable", confidence=0.9, **RULE),
+        ],
+        "index": [label(10, 11, "unstable", confidence=0.3, **RULE)],
+    }
+    page = opened(visit, service)
+    point(page, "thumb", 8)
+    shows(page, "#item", "proposed: stable[\\s\\S]*90[\\s\\S]*rule:signal · grows")
+    page.keyboard.press("Enter")
+    assert labels(page) == [(7, 9, "stable", None)]
+    saved(page)
+    accepted = {"confidence": 1, "author": "ada", "evidence": "rule:signal, accepted, grows"}
+    assert service.saves[-1]["labels"]["thumb"] == [label(7, 9, "stable", **accepted)]
+    page.keyboard.press("x")  # the next one
+    shows(page, "#open-proposals", "1 open proposal")
+    page.evaluate("holdfast.view.setWindow(12, 14)")
+    page.keyboard.press("Enter")  # it is outside the window, and shown first
+    assert labels(page) == [(7, 9, "stable", None)]
+    page.keyboard.press("Enter")
+    assert labels(page) == [(5, 7, "unstable", "closing"), (7, 9, "stable", None)]
+    for _ in range(2):
+        page.keyboard.press("Control+z")
+    shows(page, "#open-proposals", "2 open proposals")
+    page.keyboard.press("Control+Shift+z")
+    page.reload()
+    ready(page)
+    shows(page, "#open-proposals", "1 open proposal")  # rejected proposals stay rejected
+
+
+@on_both
+def test_accept_what_a_rule_proposes(visit, service, size):
+    recording = service.recordings[0]
+    recording.save({"thumb": [label(5, 6, "no_contact", author="eve")]})
+    page = opened(visit, service, size)
+    page.select_option("#rule", "tracking")
+    page.click("#propose")
+    shows(page, ".toast.bad", "there are no poses")
+    recording.rule_proposals = {
+        "thumb": [
+            label(4, 9, "stable", confidence=0.9, **RULE),
+            label(9, 10, "unstable", confidence=0.7, **RULE),
+        ],
+        "ring": [label(1, 2, "no_contact", confidence=0.85, **RULE)],
+    }
+    page.select_option("#rule", "")
+    page.click("#propose")
+    shows(page, "#open-proposals", "3 open proposals")
+    rules = [request["rule"] for request in service.propose_requests]
+    assert rules == ["tracking", ""]
+    assert flaws(page, size) == []
+    page.click("#accept-all")
+    kept = [(4, 5, "stable", None), (5, 6, "no_contact", None), (6, 9, "stable", None)]
+    assert labels(page) == kept  # labels that exist stay
+    assert labels(page, "ring") == [(1, 2, "no_contact", None)]
+    saved(page)
+    authors = [each["author"] for each in service.saves[-1]["labels"]["thumb"]]
+    assert authors == ["rule:signal", "eve", "rule:signal"]
+    page.click("#undo")
+    assert labels(page) == [(5, 6, "no_contact", None)]
+
+
+def test_review_what_has_a_low_confidence(visit, service):
+    recording = service.recordings[0]
+    recording.save({"thumb": [label(2, 4, "stable", confidence=0.5), label(10, 14, "stable")]})
+    recording.fields["proposals"] = {"index": [label(20, 21, "unstable", confidence=0.3)]}
+    page = opened(visit, service)
+    for text in ("proposed: unstable", r"stable[\s\S]*50"):
+        page.keyboard.press("g")
+        shows(page, "#item", text)
+    page.keyboard.press("Enter")  # confirms the label
+    shows(page, "#n-review-items", "^1$")
+    page.keyboard.press("g")
+    page.keyboard.press("x")
+    shows(page, "#review-items", "^$")
+    saved(page)
+    assert [each["confidence"] for each in service.saves[-1]["labels"]["thumb"]] == [1, 1]
+
+
+@pytest.fixture
+def video(tmp_path):
+    """Return the path of a video of 1.5 s."""
+    cv2 = pytest.importorskip("cv2")
+    path = tmp_path / "wrist.webm"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), 20.0, (64, 48))
+    for k in range(30):
+        writer.write(np.full((48, 64, 3), 8 * k, np.uint8))
+    writer.release()
+    return path
+
+
+def test_play_a_video_beside(visit, video):
+    media = [{"index": 0, "name": "wrist.webm", "offset": 4.0, "missing": False}]
+    at = "Math.abs(document.querySelector('#video').currentTime - {}) < 0.1"
+    with FakeService(Recording(media=media), media=video) as service:
+        page = opened(visit, service)
+        until(page, "document.querySelector('#video').readyState >= 2")
+        click(page, "thumb", 4.5)
+        until(page, at.format(0.5))
+        page.fill("#offset", "4.2")
+        page.keyboard.press("Enter")
+        until(page, at.format(0.3))
+        page.keyboard.press("Escape")
+        click(page, "thumb", 3.5)  # before the video begins
+        page.keyboard.press(" ")
+        until(page, "!document.querySelector('#video').paused")
+        assert page.evaluate("holdfast.player.time") > 4.1
+        until(page, "holdfast.player.time > 6.5")  # time continues after the end of the video
+        page.keyboard.press(" ")
+        assert not page.evaluate("holdfast.player.playing")
+        assert flaws(page, DESKTOP) == []
+        page.reload()
+        ready(page)
+        assert page.locator("#offset").input_value() == "4.2"
+
+
+@pytest.mark.parametrize("missing", [True, False])
+def test_play_although_the_video_cannot_be_shown(visit, missing):
+    media = [{"index": 0, "name": "wrist.webm", "offset": 4.0, "missing": missing}]
+    with FakeService(Recording(media=media)) as service:
+        page = opened(visit, service)
+        shows(page, "#video-problem", "wrist.webm")
+        assert page.locator("#video").is_hidden()
+        page.evaluate("holdfast.view.setWindow(10, 11)")
+        click(page, "thumb", 10.8)
+        page.select_option("#rate", "2")
+        page.click("#play")
+        until(page, "holdfast.view.start > 10.5")  # the window follows
+        page.evaluate("holdfast.player.seek(29.9)")
+        until(page, "!holdfast.player.playing")
+        assert page.evaluate("holdfast.player.time") == service.recordings[0].end
+
+
+def test_look_at_a_long_recording(visit):
+    """Zoom in to single samples; finer signals are loaded, of the newest window only."""
+    loaded = " && ".join(f"!holdfast.{each}" for each in ("signals.loading", "signals.timer"))
+    with FakeService(Recording(seconds=20_000 / 150), Recording("two", 300)) as service:
+        page = opened(visit, service)
+        x, y = position(page, "index", 40)
+        page.mouse.move(x, y)
+        page.mouse.wheel(0, -300)
+        until(page, "holdfast.view.span < 80")
+        assert position(page, "index", 40)[0] == pytest.approx(x, abs=1.1)  # whole pixels
+        for _ in range(8):
+            page.mouse.wheel(0, -300)
+        shows(page, "#window", "every sample")
+        start, end = page.evaluate(SPAN)
+        times = page.evaluate(f"[...holdfast.signals.segments('index', ...{SPAN})[0][0].t]")
+        own = service.recordings[0].signals["index"][0]
+        shown = own[(own >= start) & (own <= end)].tolist()
+        assert [t for t in times if start <= t <= end] == shown
+        page.mouse.dblclick(x, y)
+        assert page.evaluate(SPAN) == [0, service.recordings[0].end]
+        until(page, loaded)
+        service.requests.clear()
+        service.delays = [0.6]
+        for start in (40, 60, 70, 80):
+            page.evaluate(f"holdfast.view.setWindow({start}, {start + 10})")
+            page.wait_for_timeout(100)
+        until(page, "holdfast.signals.fine.start > 70")
+        assert [round(start) for start, _, _ in service.requests] == [36, 76]
+        page.keyboard.press("ArrowRight")  # a small step loads nothing
+        until(page, loaded)
+        assert len(service.requests) == 2
+        page.evaluate("holdfast.view.pan(1000)")
+        assert page.evaluate("holdfast.view.end") == service.recordings[0].end
+        box = page.locator("#overview-canvas").bounding_box()
+        page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 25)  # the overview moves it
+        assert page.evaluate(SPAN) == pytest.approx([61, 71], abs=3)
+        until(page, loaded)
+        service.delays = [0.3]
+        page.evaluate("holdfast.view.setWindow(100, 110)")
+        page.wait_for_timeout(60)
+        page.keyboard.press("n")  # the reply of the first recording is dropped
+        shows(page, "#name", "two")
+        page.wait_for_timeout(400)
+        assert page.evaluate("[holdfast.signals.fine, holdfast.signals.id]") == [None, 1]
+
+
+def test_read_values_at_the_cursor(visit, service):
+    times, values = service.recordings[0].signals["ring"]
+    page = opened(visit, service)
+    page.evaluate("holdfast.view.setWindow(10, 11)")
+    shows(page, "#window", "every sample")
+    legend = ".finger-legend:nth-child(4)"
+    for component in range(2):
+        point(page, "ring", float(times[1550]) + 0.001 * component)
+        shows(page, f"{legend} .value", f"^{values[component, 1550]:.0f}$")
+        page.keyboard.press("f")
+    page.select_option("#force", "xyz")
+    names = page.locator(f"{legend} .label").all_inner_texts()
+    assert names == ["Fx", "Fy", "Fz", "σ"]
+
+
+def test_go_through_the_recordings_of_a_folder(visit):
+    class Broken(Recording):
+        def describe(self, index):
+            raise ValueError("no")
+
+        def entry(self, index):
+            return super().entry(index) | {"error": "broken.parquet: damaged", "duration": None}
+
+    others = Broken("broken"), Recording("three", fingers=("left", "right"), read_only=True)
+    others[1].save({"left": [label(5, 9, "stable")]})
+    with FakeService(Recording("one"), *others) as service:
+        page = opened(visit, service)
+        drag(page, "thumb", 8, 12)
+        page.keyboard.press("n")  # the drawn label is saved first
+        shows(page, "#name", "broken")
+        shows(page, "#alert", "500")
+        assert len(service.recordings[0].file["labels"]["thumb"]) == 1
+        page.click("#next-recording")
+        shows(page, "#name", "three")
+        shows(page, "#alert", "Read-only")
+        drag(page, "left", 12, 14)
+        click(page, "left", 7)
+        for key in ("2", "a", "Delete", "Control+z", "Shift+Enter"):
+            page.keyboard.press(key)
+        assert labels(page, "left") == [(5, 9, "stable", None)]
+        assert page.locator("#note").is_disabled()
+        page.keyboard.press("n")
+        shows(page, "#toasts", "last recording")
+        page.reload()
+        shows(page, "#name", "three")
+        page.click("#recordings button[data-id='0']")
+        until(page, "holdfast.editor.fingers.length === 4")
+        assert rounded(labels(page)) == [(8, 12, "stable", None)]
+        assert len(service.saves) == 1
+
+
+@on_both
+def test_change_between_light_and_dark(visit, service, size):
+    service.recordings[0].save({"thumb": [label(5, 9, "stable"), label(9, 12, "unstable", "slip")]})
+    page = opened(visit, service, size, scheme="light")
+    assert flaws(page, size) == []
+    colour = "getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(colour)
+    page.emulate_media(color_scheme="dark")
+    until(page, f"(light) => {colour} !== light", light)
+    assert flaws(page, size) == []
+
+
+def test_names_are_shown_as_text(visit):
+    rule = {"author": HOSTILE, "evidence": HOSTILE, "confidence": 0.3}
+    media = [{"index": 0, "name": HOSTILE, "offset": 0, "missing": True}]
+    hostile = Recording(
+        HOSTILE, fingers=(HOSTILE, "thumb"), markers=[(3.0, HOSTILE)], media=media,
+        proposals={"thumb": [label(2, 3, "stable", **rule)]},
+    )  # fmt: skip
+    hostile.save({HOSTILE: [label(4, 5, "unstable", **rule)]}, note=HOSTILE, author=HOSTILE)
+    with FakeService(hostile) as service:
+        page = opened(visit, service)
+        page.keyboard.press("g")
+        named = ("#name", ".finger-legend h3", "#recordings")
+        for selector in (*named, "#save-text", "#video-problem", "#item"):
+            shows(page, selector, "<img src=x onerror=alert")
+        assert page.locator("img").count() == 0
