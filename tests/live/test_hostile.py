@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from devices.sources.xela.servers import HANG_UP, free_port, server
-from holdfast.contact import ContactState, Fault
+from holdfast.contact import ContactState
 from holdfast.detector import detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.sensors import sensor
 
 from . import build
-from .test_session import wait_for
+from .build import wait_for
 
 pytestmark = pytest.mark.slow  # servers and sockets
 
@@ -117,35 +116,3 @@ def test_a_restarted_server_keeps_the_tare_and_the_clock():
     expected = detect(build.model(), recording).fingers["thumb"].force[899]
     np.testing.assert_allclose(estimates[-1].fingers["thumb"].force, expected)
     assert any(one.fingers["thumb"].state is not ContactState.UNKNOWN for one in estimates[-100:])
-
-
-def test_a_module_of_another_size_is_unknown_until_its_size_is_right():
-    recording = build.grasp()
-    packets = packets_of(recording)
-    one = build.arrivals_of(recording)[500]
-    sensors = {name: module.sensor for name, module in recording.modules.items()}
-    smaller = XelaEncoder({**sensors, "thumb": sensor("uskin-4x6")})
-    samples = {**one.samples, "thumb": one.samples["thumb"][:24]}
-    odd = smaller.packet(samples, EPOCH + one.time, EPOCH + one.time)
-    updates = []
-    with (
-        server([*packets[:500], odd, *packets[501:600]]) as (port, _),
-        open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
-    ):
-        session = Session(StreamDetector(build.model(), source))
-        session.add_listener(updates.append)
-        session.start()
-        wait_for(lambda: session.n_packets == 600)
-        session.stop()
-    estimates = [d for update in updates if update.arrival for d in update.estimates]
-    odd_ones = [  # a busy machine may add LATE, of any finger
-        k for k, d in enumerate(estimates)
-        if Fault.TAXEL_COUNT in d.estimate.fingers["thumb"].faults
-    ]  # fmt: skip
-    assert odd_ones
-    for k in odd_ones:
-        fingers = estimates[k].estimate.fingers
-        assert fingers["thumb"].state is ContactState.UNKNOWN
-        assert Fault.TAXEL_COUNT not in fingers["index"].faults
-    later = [d.estimate.fingers["thumb"] for d in estimates[odd_ones[-1] + 1 :]]
-    assert any(thumb.state is not ContactState.UNKNOWN for thumb in later)

@@ -3,7 +3,7 @@
 import pytest
 
 from browser import shows, until
-from labelling.page.actions import drag, labels, opened, ready, rounded, saved
+from labelling.page.actions import drag, labels, opened, ready, saved
 from labelling.page.fake_service import FakeService, Recording, label
 
 OWN = (8, 12, "stable", None)
@@ -19,14 +19,14 @@ def test_another_program_saves_meanwhile(visit, service, choice):
     shows(page, "#question", r"1 label by eve")
     shows(page, "#save-text", "NOT SAVED")
     page.keyboard.press("Escape")  # does not close the dialog
-    assert rounded(labels(page)) == [OWN]
+    assert labels(page) == [OWN]
     page.click(f"#question button[data-value={choice}]")
     saved(page)
     kept, other = (OTHERS, OWN) if choice == "file" else (OWN, OTHERS)
-    assert rounded(labels(page)) == [kept]
+    assert labels(page) == [kept]
     assert page.locator("#note").input_value() == ("other note" if choice == "file" else "")
     page.keyboard.press("Control+z")  # brings back the other version
-    assert rounded(labels(page)) == [other]
+    assert labels(page) == [other]
     saved(page)
     until(page, "holdfast.saver.revision === 'r2' || holdfast.saver.revision === 'r3'")
     (sent,) = recording.file["labels"]["thumb"]
@@ -34,7 +34,7 @@ def test_another_program_saves_meanwhile(visit, service, choice):
     page.reload()
     ready(page)
     assert page.locator("#question").is_hidden()
-    assert rounded(labels(page)) == [other]
+    assert labels(page) == [other]
 
 
 @pytest.mark.parametrize("answer", ["restore", "discard"])
@@ -54,7 +54,7 @@ def test_unsaved_labels_are_offered_after_a_crash(visit, service, answer):
     saved(again)
     expected = (OWN, "half done") if answer == "restore" else (OTHERS, "")
     for _ in range(2):
-        found = rounded(labels(again)), again.locator("#note").input_value()
+        found = labels(again), again.locator("#note").input_value()
         assert found == ([expected[0]], expected[1])
         again.reload()
         ready(again)
@@ -87,14 +87,13 @@ def test_a_refused_save_is_shown_and_not_repeated(visit):
         page.keyboard.press("p")  # it is offered when the recording is opened again
         page.click("#question button[data-value=restore]")
         saved(page)
-        assert rounded(labels(page)) == [OWN]
+        assert labels(page) == [OWN]
 
 
 def test_quick_changes_are_saved_together(visit, service):
     page = opened(visit, service)
-    page.evaluate("""() => { for (let k = 0; k < 20; k += 1) {
-      holdfast.editor.draw(["thumb"], k + 0.1, k + 0.6, true);
-    } }""")
+    for k in range(20):
+        page.evaluate(f"holdfast.editor.draw(['thumb'], {k + 0.1}, {k + 0.6}, true)")
     saved(page)
     page.evaluate("holdfast.editor.draw(['thumb'], 25, 26, true)")
     page.keyboard.press("Control+z")  # before it is saved
