@@ -41,25 +41,19 @@ def packets_of(recording, epoch=EPOCH):
 
 
 def garbage(packet, generator):
-    """An invalid packet: cut, corrupted, with another number of taxels, or random bytes."""
-    text = bytearray(packet)
-    kind = generator.randrange(6)
-    if kind == 0:
-        return bytes(text[: generator.randrange(len(text))])
-    if kind == 1:
-        for _ in range(1 + generator.randrange(8)):
-            text[generator.randrange(len(text))] = generator.randrange(256)
-        return bytes(text)
-    if kind == 2:
-        return packet.replace(b'"data":"', b'"data":"ZZZZ,', 1)
-    if kind == 3:
-        return b'{"message": 5, "time": 1e308, "1": {"data": "8000", "taxels": 1}}'
-    if kind == 4:
-        return b"[" * generator.randrange(2000)
-    return generator.randbytes(generator.randrange(300))
+    """An invalid packet: cut, of another number of taxels, or random bytes."""
+    odd = b'{"message": 5, "time": 1e308, "1": {"data": "8000", "taxels": 1}}'
+    return generator.choice(
+        [
+            packet[: generator.randrange(len(packet))],
+            packet.replace(b'"data":"', b'"data":"ZZZZ,', 1),
+            odd,
+            b"[" * generator.randrange(2000),
+            generator.randbytes(generator.randrange(300)),
+        ]
+    )
 
 
-@pytest.mark.slow
 def test_ten_thousand_invalid_packets_do_no_harm():
     recording = build.grasp()
     packets = packets_of(recording)
@@ -103,15 +97,10 @@ def test_a_restarted_server_keeps_the_tare_and_the_clock():
     finally:
         session.stop()
     assert session.failure is None
-    estimates = [
-        d.estimate for update in updates for d in update.estimates if update.arrival is not None
-    ]
-    times = [one.time for one in estimates]
-    assert (np.diff(times) > 0).all()
-    notices = [
-        n for update in updates if update.arrival is not None for n in update.arrival.notices
-    ]
-    assert any("connection lost" in notice for notice in notices)
+    updates = [update for update in updates if update.arrival is not None]
+    estimates = [one.estimate for update in updates for one in update.estimates]
+    assert (np.diff([one.time for one in estimates]) > 0).all()
+    assert any("connection lost" in text for x in updates for text in x.arrival.notices)
     # The tare was kept: the force is that of the recording, and no finger waits for a new one.
     expected = detect(build.model(), recording).fingers["thumb"].force[899]
     np.testing.assert_allclose(estimates[-1].fingers["thumb"].force, expected)

@@ -89,13 +89,6 @@ def test_the_status_shows_the_progress(path):
     assert (status.failure, recorder.failed) == ("", False)
 
 
-def test_gaps_are_found_from_the_measured_rate(path):
-    with Recorder(path, TWO) as recorder:  # 10 Hz, where the sensor promises 100 Hz
-        for k in range(50):
-            recorder.put(arrival(k, time=k / 10 + (k > 30)))
-    assert recorder.status.n_gaps == load_recording(path).modules["thumb"].n_gaps == 1
-
-
 def test_markers_have_the_times_at_which_they_were_set(path):
     with Recorder(path, TWO) as recorder:
         recorder.add_marker("early")
@@ -244,9 +237,8 @@ def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, stuck, monkeypat
 
 
 def test_a_closed_recorder_drops_arrivals(path):
-    recorder = Recorder(path, TWO)
-    recorder.put(arrival(0))
-    recorder.close()
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
     recorder.put(arrival(1), wait=True)
     recorder.add_marker("late")
     recorder.close()
@@ -256,11 +248,10 @@ def test_a_closed_recorder_drops_arrivals(path):
 
 def test_an_existing_file_is_kept_unless_forced(path):
     path.write_text("mine")
-    with pytest.raises(OutputError, match=r"a\.mcap"):
-        Recorder(path, TWO)
-    with pytest.raises(RecordingError):
-        Recorder(path, TWO, metadata={"a": object()}, force=True)
-    assert path.read_text() == "mine"
+    for options in ({}, {"metadata": {"a": object()}, "force": True}):
+        with pytest.raises((OutputError, RecordingError)):
+            Recorder(path, TWO, **options)
+        assert path.read_text() == "mine"
     with Recorder(path, TWO, force=True) as recorder:
         recorder.put(arrival(0))
     assert load_recording(path).complete
@@ -329,38 +320,32 @@ def test_an_error_in_the_thread_is_raised_by_close(path, monkeypatch):
 
 
 FULL = """
-import resource, sys, time
+import resource, sys
 import numpy as np
-from holdfast.errors import OutputError
+from holdfast.devices.sources import Arrival
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
 
 recorder = Recorder(sys.argv[1], {"thumb": sensor("anyskin")})
 noise = np.random.default_rng(0)
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
-end = time.monotonic() + 30
-for k in range(10**9):
+for k in range(100_000):
     values = noise.integers(0, 65535, (5, 3)).astype(np.uint16)
     values[0, 0] = k
     recorder.put(Arrival(k / 100, {"thumb": values}, received=0.0), wait=True)
-    if recorder.failed or time.monotonic() > end:
+    if recorder.failed:
         break
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-try:
-    recorder.close()
-except OutputError as error:
-    print(error)
+recorder.close()
 """
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs limits of POSIX")
 def test_a_full_disk_keeps_what_was_written(path):
     """Even if there is space again at the end: closing would make the file look damaged."""
-    done = subprocess.run(
-        [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
-    )
-    assert done.stdout.startswith(f"cannot write {path}: ")
+    words = [sys.executable, "-c", FULL, str(path)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert f"OutputError: cannot write {path}: " in done.stderr
     recording = load_recording(path)
     assert not recording.complete
     thumb = recording.modules["thumb"]
