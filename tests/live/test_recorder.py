@@ -42,23 +42,6 @@ def path(tmp_path):
     return tmp_path / "a.mcap"
 
 
-@pytest.fixture
-def stuck(monkeypatch):
-    """A disk that writes nothing until the event is set."""
-    go, entered = threading.Event(), threading.Event()
-    append = RecordingWriter.append
-
-    def slow(self, *given):
-        entered.set()
-        go.wait(PATIENCE)
-        append(self, *given)
-
-    monkeypatch.setattr(RecordingWriter, "append", slow)
-    go.entered = entered
-    yield go
-    go.set()
-
-
 def test_arrivals_are_recorded_with_the_times_of_each_module(path):
     with Recorder(path, TWO, name="grasp", metadata={"object": "can"}) as recorder:
         for k in range(300):
@@ -78,8 +61,7 @@ def test_the_status_shows_the_progress(path):
         assert recorder.status.seconds == 0.0
         for k in [*range(100), *range(150, 200)]:
             recorder.put(arrival(k, "thumb", n_lost=k == 150, n_refused=2 * (k == 7)))
-        wait_for(lambda: recorder.status.n_samples == 150)
-        wait_for(lambda: recorder.status.rate > 0)
+        wait_for(lambda: recorder.status.n_samples == 150 and recorder.status.rate > 0)
         recorder.add_marker("one")
     status = recorder.status
     assert status.seconds == pytest.approx(1.99)
@@ -220,20 +202,33 @@ def test_with_wait_no_sample_is_dropped(path, monkeypatch):
     assert (recorder.status.n_dropped, recorder.status.n_samples) == (0, 100)
 
 
-def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, stuck, monkeypatch):
+def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, monkeypatch):
     monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 50)
+    monkeypatch.setattr(module, "_MAX_QUEUED_MARKERS", 3)
+    go_on, entered, append = threading.Event(), threading.Event(), RecordingWriter.append
+
+    def slow(self, *given):
+        entered.set()
+        go_on.wait(PATIENCE)
+        append(self, *given)
+
+    monkeypatch.setattr(RecordingWriter, "append", slow)
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
-        assert stuck.entered.wait(PATIENCE)
+        assert entered.wait(PATIENCE)
         for k in range(1, 201):
             recorder.put(arrival(k))  # would block for ever if it waited
+        for k in range(10):
+            recorder.add_marker(f"mark {k}")
         assert recorder.status.n_dropped == 150
-        stuck.set()
+        go_on.set()
         wait_for(lambda: recorder.status.n_samples == 51)
         recorder.put(arrival(300))
     recording = load_recording(path)
     assert recording.modules["thumb"].readings[:, 0, 0].tolist() == [*range(51), 300]
-    assert (0.5, "note: 150 samples dropped: the disk is too slow") in recording.markers
+    texts = [text for _, text in recording.markers]
+    assert [text for text in texts if text.startswith("mark")] == ["mark 0", "mark 1", "mark 2"]
+    assert any("150 samples dropped" in text for text in texts)
 
 
 def test_a_closed_recorder_drops_arrivals(path):
