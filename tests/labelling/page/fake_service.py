@@ -4,12 +4,15 @@ import asyncio
 from importlib import resources
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from aiohttp import web
 
 from browser import PageService
+from holdfast.labelling.server.signals import FingerSignals, Signals
+from holdfast.recordings import Tactile
+from holdfast.sensors import sensor
 
-SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0
 NOW = "2026-01-02T03:04:05+00:00"
@@ -21,23 +24,18 @@ def label(start, end, state, cause=None, **fields):
     return {"start": start, "end": end, "state": state, "cause": cause, **defaults, **fields}
 
 
-def signals(n, seed):
-    """Return times, and force and sigma of a finger that grasps, is disturbed, and releases."""
-    rng = np.random.default_rng(seed)
-    times = np.arange(n) / RATE
+def made_up(seconds, fingers):
+    """Return signals of fingers that grasp, are disturbed, and release."""
+    times = np.arange(round(seconds * RATE)) / RATE
     phase = times / times[-1]
     press = np.clip((phase - 1 / 6) * 12, 0, 1) * (1 - np.clip((phase - 5 / 6) * 24, 0, 1))
     shake = np.exp(-(((phase - 0.5) / 0.03) ** 2)) * np.sin(40 * times)
-    force = np.stack([300 * press + 200 * shake, 200 * press, 2000 * press + 150 * shake])
-    force += rng.normal(0, 4, force.shape)
-    sigma = 3 + 100 * np.abs(shake) + rng.exponential(0.5, n)
-    return times, np.vstack([np.linalg.norm(force, axis=0), force, sigma])
-
-
-def extremes(block):
-    """Return (n_series, 2) minimum and maximum of each row, the earlier one first."""
-    places = np.sort([block.argmin(axis=1), block.argmax(axis=1)], axis=0)
-    return np.take_along_axis(block, places.T, axis=1)
+    load = (400 * press + 40 * shake)[:, None, None] * [0.1, 0.1, 1.0]
+    found = {}
+    for seed, finger in enumerate(fingers):
+        noise = np.random.default_rng(seed).normal(0, 2, (len(times), 5, 3))
+        found[finger] = FingerSignals(Tactile(sensor("anyskin"), times, load + noise))
+    return Signals(0.0, float(times[-1]), found)
 
 
 class Recording:
@@ -52,9 +50,8 @@ class Recording:
 
     def __init__(self, name="grasp", seconds=30.0, fingers=FINGERS, **fields):
         self.name, self.fingers = name, list(fingers)
-        n = round(seconds * RATE)
-        self.signals = {finger: signals(n, seed) for seed, finger in enumerate(fingers)}
-        self.end = (n - 1) / RATE
+        self.signals = made_up(seconds, fingers)
+        self.end = self.signals.end
         self.changes = {
             finger: [round(part * self.end / 12, 3) for part in (2, 3, 6, 10)] for finger in fingers
         }
@@ -90,25 +87,6 @@ class Recording:
         self.file = {"labels": labels, "note": note, "author": author, "time": NOW,
                      "origin": "file"}  # fmt: skip
         return {"revision": f"r{self.version}", "time": NOW}
-
-    def signals_between(self, start, end, points):
-        """Return the series between two times: every sample, or minima and maxima in order."""
-        exact, fingers = True, {}
-        for finger, (times, values) in self.signals.items():
-            first = max(0, np.searchsorted(times, start) - 1)
-            part = slice(first, np.searchsorted(times, end, side="right") + 1)
-            t, columns = times[part], values[:, part]
-            if len(t) > 2 * points:
-                exact = False
-                n = -(-len(t) // points)
-                edges = np.arange(0, len(t), n)
-                blocks = [columns[:, k : k + n] for k in edges]
-                middles = t[np.minimum(edges + n // 2, len(t) - 1)]
-                t = np.stack([t[edges], middles], axis=1).ravel()
-                columns = np.hstack([extremes(block) for block in blocks])
-            lists = {name: row.tolist() for name, row in zip(SERIES, columns, strict=True)}
-            fingers[finger] = {"t": t.tolist(), **lists}
-        return {"start": start, "end": end, "exact": exact, "fingers": fingers}
 
 
 class FakeService(PageService):
@@ -152,7 +130,8 @@ class FakeService(PageService):
         self.requests.append((start, end, points))
         if self.delays:
             await asyncio.sleep(self.delays.pop(0))
-        return web.json_response(self.recording(request).signals_between(start, end, int(points)))
+        part = self.recording(request).signals.part(start, end, points)
+        return web.Response(body=msgspec.json.encode(part), content_type="application/json")
 
     async def changes(self, request):
         return web.json_response({"fingers": self.recording(request).changes})
@@ -171,9 +150,8 @@ class FakeService(PageService):
     async def propose(self, request):
         self.propose_requests.append(await request.json())
         proposals = self.recording(request).rule_proposals
-        if not proposals:
-            return web.json_response({"error": "there are no poses"}, status=422)
-        return web.json_response({"rule": "signal", "proposals": proposals, "doubtful": []})
+        answer = {"proposals": proposals} if proposals else {"error": "there are no poses"}
+        return web.json_response(answer, status=200 if proposals else 422)
 
     async def video(self, _):
         if self.media is None:

@@ -158,7 +158,7 @@ def test_accept_and_reject_proposals(visit, service):
 def test_accept_what_a_rule_proposes(visit, service, size):
     recording = service.recordings[0]
     recording.save({"thumb": [label(5, 6, "no_contact", author="eve")]})
-    page = opened(visit, service, size)
+    page = opened(visit, service, size, scheme="light")
     page.select_option("#rule", "tracking")
     page.click("#propose")
     shows(page, ".toast.bad", "there are no poses")
@@ -171,6 +171,8 @@ def test_accept_what_a_rule_proposes(visit, service, size):
     shows(page, "#open-proposals", "3 open proposals")
     rules = [request["rule"] for request in service.propose_requests]
     assert rules == ["tracking", ""]
+    assert flaws(page, size) == []
+    page.emulate_media(color_scheme="dark")
     assert flaws(page, size) == []
     page.click("#accept-all")
     kept = [(4, 5, "stable", None), (5, 6, "no_contact", None), (6, 9, "stable", None)]
@@ -200,19 +202,13 @@ def test_review_what_has_a_low_confidence(visit, service):
     assert [each["confidence"] for each in service.saves[-1]["labels"]["thumb"]] == [1, 1]
 
 
-@pytest.fixture
-def video(tmp_path):
-    """Return the path of a video of 1.5 s."""
+def test_play_a_video_beside(visit, tmp_path):
     cv2 = pytest.importorskip("cv2")
-    path = tmp_path / "wrist.webm"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"VP80"), 20.0, (64, 48))
+    video = tmp_path / "wrist.webm"
+    writer = cv2.VideoWriter(str(video), cv2.VideoWriter.fourcc(*"VP80"), 20.0, (64, 48))
     for k in range(30):
         writer.write(np.full((48, 64, 3), 8 * k, np.uint8))
     writer.release()
-    return path
-
-
-def test_play_a_video_beside(visit, video):
     media = [{"index": 0, "name": "wrist.webm", "offset": 4.0, "missing": False}]
     at = "Math.abs(document.querySelector('#video').currentTime - {}) < 0.1"
     with FakeService(Recording(media=media), media=video) as service:
@@ -269,10 +265,17 @@ def test_look_at_a_long_recording(visit):
         shows(page, "#window", "every sample")
         start, end = page.evaluate(SPAN)
         times = page.evaluate(f"[...holdfast.signals.segments('index', ...{SPAN})[0][0].t]")
-        own = service.recordings[0].signals["index"][0]
+        signals = service.recordings[0].signals.fingers["index"]
+        own = signals.times
         shown = own[(own >= start) & (own <= end)].tolist()
         assert [t for t in times if start <= t <= end] == shown
-        page.mouse.dblclick(x, y)
+        k = int(np.searchsorted(own, start)) + 2
+        point(page, "index", float(own[k]))  # the values at the cursor
+        value = f"^{signals.values[k, 0]:.0f}$"
+        shows(page, ".finger-legend:nth-child(2) .value", value)
+        page.select_option("#force", "xyz")
+        shows(page, ".finger-legend", r"Fx[\s\S]*Fy[\s\S]*Fz[\s\S]*σ")
+        page.keyboard.press("0")
         assert page.evaluate(SPAN) == [0, service.recordings[0].end]
         until(page, loaded)
         service.requests.clear()
@@ -285,6 +288,8 @@ def test_look_at_a_long_recording(visit):
         page.keyboard.press("ArrowRight")  # a small step loads nothing
         until(page, loaded)
         assert len(service.requests) == 2
+        page.keyboard.press("-")
+        page.keyboard.press("+")
         page.evaluate("holdfast.view.pan(1000)")
         assert page.evaluate("holdfast.view.end") == service.recordings[0].end
         box = page.locator("#overview-canvas").bounding_box()
@@ -298,21 +303,6 @@ def test_look_at_a_long_recording(visit):
         shows(page, "#name", "two")
         page.wait_for_timeout(400)
         assert page.evaluate("[holdfast.signals.fine, holdfast.signals.id]") == [None, 1]
-
-
-def test_read_values_at_the_cursor(visit, service):
-    times, values = service.recordings[0].signals["ring"]
-    page = opened(visit, service)
-    page.evaluate("holdfast.view.setWindow(10, 11)")
-    shows(page, "#window", "every sample")
-    legend = ".finger-legend:nth-child(4)"
-    for component in range(2):
-        point(page, "ring", float(times[1550]) + 0.001 * component)
-        shows(page, f"{legend} .value", f"^{values[component, 1550]:.0f}$")
-        page.keyboard.press("f")
-    page.select_option("#force", "xyz")
-    names = page.locator(f"{legend} .label").all_inner_texts()
-    assert names == ["Fx", "Fy", "Fz", "σ"]
 
 
 def test_go_through_the_recordings_of_a_folder(visit):
@@ -349,18 +339,6 @@ def test_go_through_the_recordings_of_a_folder(visit):
         until(page, "holdfast.editor.fingers.length === 4")
         assert labels(page) == [(8, 12, "stable", None)]
         assert len(service.saves) == 1
-
-
-@on_both
-def test_change_between_light_and_dark(visit, service, size):
-    service.recordings[0].save({"thumb": [label(5, 9, "stable"), label(9, 12, "unstable", "slip")]})
-    page = opened(visit, service, size, scheme="light")
-    assert flaws(page, size) == []
-    colour = "getComputedStyle(document.body).backgroundColor"
-    light = page.evaluate(colour)
-    page.emulate_media(color_scheme="dark")
-    until(page, f"(light) => {colour} !== light", light)
-    assert flaws(page, size) == []
 
 
 def test_names_are_shown_as_text(visit):

@@ -26,10 +26,7 @@ SESSION = """async ([operations]) => {
   for (const [what, finger, x, y, z] of operations) {
     const label = pick(finger, z), before = editor.state;
     if (label) editor.select(finger, label);
-    if (what === "draw") {
-      editor.select(null, null);
-      editor.draw([finger], 33 * x - 1, 33 * y - 1, true);
-    }
+    if (what === "draw") editor.draw([finger], 33 * x - 1, 33 * y - 1, true);
     if (what === "all") editor.draw(fingers, 30 * x, 30 * y, true);
     const side = x < 0.5 ? "start" : "end", states = ["stable", "unstable", "no_contact"];
     if (what === "edge" && label) editor.moveEdge(finger, label, side, 34 * y - 2, true);
@@ -37,11 +34,9 @@ SESSION = """async ([operations]) => {
     if (what === "cause") editor.setKind({ cause: ["slip", "closing"][Math.floor(2 * x)] });
     if (what === "delete") editor.remove();
     if (what === "copy") editor.copy();
-    if (what === "accept" && editor.proposals.length) {
-      const { proposals } = editor;
-      editor.accept({ kind: "proposal", ...proposals[Math.floor(x * proposals.length)] });
-    }
-    if (what === "reject" && editor.proposals.length) editor.reject(editor.proposals[0]);
+    const [proposal] = editor.proposals;
+    if (what === "accept" && proposal) editor.accept({ kind: "proposal", ...proposal });
+    if (what === "reject" && proposal) editor.reject(proposal);
     if (what === "fill") editor.acceptAll(x);
     for (const own of Object.values(editor.state.labels)) {
       const valid = own.every(({ start, end }, k) => start >= (own[k - 1]?.end ?? 0)

@@ -36,10 +36,8 @@ def made_up(names=FINGERS, layout="uskin-curved", rate=150.0):
         state[times < 0.6] = 0
         centre = layout.positions[place % layout.n_taxels]
         near = np.exp(-np.sum((layout.positions - centre) ** 2, axis=1) / 1e-4)
-        pull = 0.4 * shake * np.sin(60 * times)
-        shares = np.stack([0.3 * press + pull, 0.2 * press, press + 0.2 * pull], axis=1)
-        noise = rng.normal(0, 1, (n, len(near), 3))
-        taxels = 900 * near[None, :, None] * shares[:, None, :] + noise
+        load = 900 * (press + 0.2 * shake * np.sin(60 * times))[:, None, None] * [0.3, 0.2, 1.0]
+        taxels = load * near[:, None] + rng.normal(0, 1, (n, len(near), 3))
         tracks[name] = SimpleNamespace(
             layout=layout, taxels=taxels, state=state,
             force=np.einsum("kij,nkj->ni", layout.rotations, taxels),
@@ -106,9 +104,8 @@ class Tape:
         rounds = np.arange(start // self.length, stop // self.length + 1)
         clock = (self.times + self.length * rounds[:, None]).ravel()
         picks = np.flatnonzero((clock >= start) & (clock < stop))
-        rows = picks % len(self.times)
+        rows, now = picks % len(self.times), float(clock[picks[-1]])
         self.n_packets += len(rows)
-        now = float(clock[picks[-1]])
         fingers = {name: self.finger(track, rows[-1]) for name, track in self.tracks.items()}
         for name, fields in self.change.items():
             fingers[name].update(fields)

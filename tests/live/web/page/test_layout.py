@@ -10,13 +10,12 @@ TURNED = "async (given) => (await import('/page/layout.js')).toMapFrame(...given
 
 
 def laid_out(page, layout):
-    found = page.evaluate(
-        LAYOUT, [layout.positions.tolist(), layout.rotations.tolist(), layout.normal.tolist()]
-    )
+    parts = (layout.positions, layout.rotations, layout.normal)
+    found = page.evaluate(LAYOUT, [part.tolist() for part in parts])
     return {name: np.array(value) for name, value in found.items()}
 
 
-@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "papillarray", "anyskin", "gtac"])
+@pytest.mark.parametrize("name", ["uskin-4x4", "gtac"])
 def test_a_flat_patch_does_not_change(module, name):
     layout = sensor(name)
     found = laid_out(module, layout)
@@ -50,10 +49,3 @@ def test_a_push_to_the_tip_points_up_on_every_taxel_of_the_wall(module):
             [reading.tolist(), rotation, found["right"][k].tolist(), found["up"][k].tolist()],
         )
         assert arrow == pytest.approx([0, 2, 0], abs=1e-6)
-
-
-def test_taxels_without_places_get_a_grid(module):
-    eye = np.eye(3).tolist()
-    found = module.evaluate(LAYOUT, [[[0, 0, 0]] * 7, [eye] * 7, [0, 0, 1]])
-    assert len({tuple(place) for place in found["places"]}) == 7
-    assert found["spacing"] == pytest.approx(5e-3)
