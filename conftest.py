@@ -93,6 +93,13 @@ def browser():
         browser.close()
 
 
+@pytest.fixture(scope="session")
+def noted():
+    """Messages of the browser about refusals and lost connections, which a page cannot prevent."""
+    refusals = r"Failed to load resource: .*(\b4(01|03|04|09|22)\b|\b50\d\b|ERR_CONNECTION)"
+    return refusals + "|WebSocket connection to"
+
+
 @pytest.fixture
 def visit(browser, noted):
     """A function that opens an address; all complaints of its pages are errors."""

@@ -15,6 +15,18 @@ FINGERS = ("thumb", "index", "middle")
 TWIN = "builtin:twin"
 
 
+PATIENCE = 30.0
+"""Time after which a waiting test fails [s]."""
+
+
+def wait_for(condition):
+    """Wait until the work of a thread is done, and fail if it never is."""
+    end = time.monotonic() + PATIENCE
+    while not condition():
+        assert time.monotonic() < end, "the condition never became true"
+        time.sleep(0.005)
+
+
 def grasp(seed=1, name="grasp", fingers=FINGERS):
     """A synthetic recording of a grasp that is shaken, with curved fingertips."""
     return synthetic_recording(name, seed, fingers)

@@ -10,9 +10,9 @@ from holdfast.errors import OutputError, SourceError
 from holdfast.io.stickers import picture_stamps
 from holdfast.live import camera as module
 from holdfast.live.camera import CameraRecorder
+from live.build import PATIENCE, wait_for
 
 cv2 = pytest.importorskip("cv2")
-PATIENCE = 20.0
 
 
 @pytest.fixture
@@ -43,20 +43,14 @@ def brightness(path):
     return values
 
 
-def wait_for(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.005)
-    assert condition()
-
-
 def test_pictures_are_kept_with_the_times_of_the_session(film, tmp_path):
     out, said = tmp_path / "run.mp4", []
     session = Session(iter(np.arange(1.5, 9)).__next__)
     with CameraRecorder(str(film), out) as camera:
         camera.start(session, said.append)
         wait_for(lambda: said)
-    assert said == session.markers == ["note: the camera ended after 6 pictures"]
+    assert said == session.markers
+    assert "6 pictures" in said[0]
     assert brightness(out) == [0, 1, 2, 3, 4, 5]
     assert picture_stamps(out).tolist() == [1.5, 2.5, 3.5, 4.5, 5.5, 6.5]
 
@@ -89,28 +83,25 @@ def test_a_camera_that_stalls_is_reported_once(film, tmp_path, monkeypatch):
         session = Session(clock)
         camera.start(session)
         wait_for(lambda: session.markers)
-        time.sleep(0.1)  # it has looked several times
-        assert session.markers == ["note: the camera has sent no picture for 0.02 s"]
+        go_on.wait(0.1)  # it looks several times
+        assert len(session.markers) == 1
         go_on.set()
 
 
 def test_a_missing_camera_is_one_line(tmp_path, capfd):
-    with pytest.raises(SourceError, match=r"no camera .*none\.mp4: the number of a camera \(0"):
+    with pytest.raises(SourceError, match=r"none\.mp4"):
         CameraRecorder(str(tmp_path / "none.mp4"), tmp_path / "run.mp4")
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_video_is_not_replaced_unasked(film, tmp_path):
+def test_a_video_that_cannot_be_written_and_one_that_exists(film, tmp_path):
     out = tmp_path / "run.mp4"
     out.touch()
-    with pytest.raises(OutputError, match="exists already"):
+    with pytest.raises(OutputError, match=r"run\.mp4"):
         CameraRecorder(str(film), out)
     CameraRecorder(str(film), out, force=True).close()
-
-
-def test_a_video_that_cannot_be_written_is_one_line(film, tmp_path):
     with (
         CameraRecorder(str(film), tmp_path / "none" / "run.mp4") as camera,
-        pytest.raises(OutputError, match=r"cannot write .*run\.mp4: no such folder, or no codec"),
+        pytest.raises(OutputError, match=r"cannot write .*run\.mp4"),
     ):
         camera.start(Session(time.monotonic))

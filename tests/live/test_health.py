@@ -83,25 +83,20 @@ def test_a_taxel_that_is_noisier_than_at_the_last_check():
 def test_a_touched_hand_is_refused():
     readings = open_hand()
     readings[520:700, 5, 2] += 200
-    message = "index was touched at 5.3 s: open the hand, let nothing touch it, and try again"
-    with pytest.raises(SourceError, match=message):
+    with pytest.raises(SourceError, match=r"index was touched at 5\.3 s"):
         health(readings)
+    with pytest.raises(SourceError, match="index: 5 samples given, at least 20 expected"):
+        health(open_hand()[:5], times=TIMES[:5])
     turned = open_hand() + np.interp(TIMES, [3, 6], [0, 1])[:, None, None] * [300, 0, 0]
     assert health(turned).field > 150
     with pytest.raises(SourceError, match="index was touched at "):  # a field moves no other sensor
         health(turned, replace(PATCH, magnetic=False))
 
 
-def test_too_few_samples_are_refused():
-    with pytest.raises(SourceError, match="index: 5 samples given, at least 20 expected"):
-        health(open_hand()[:5], times=TIMES[:5])
-
-
 def test_one_taxel_is_said():
     one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
-    readings = 500 + np.random.default_rng(0).normal(0, 3, (1000, 1, 3))
-    found = changes_since(check("2026-11-26", index=health(readings, one)), None)
-    assert found == ["index has one taxel: a field and a touch look the same in it"]
+    (text,) = changes_since(check("2026-11-26", index=health(open_hand()[:, :1], one)), None)
+    assert text.startswith("index has one taxel")
 
 
 def test_a_source_is_read_for_some_seconds(tmp_path):

@@ -7,16 +7,15 @@ import numpy as np
 import pytest
 
 from devices.sources.xela.servers import HANG_UP, free_port, server
-from holdfast.contact import ContactState, Fault
+from holdfast.contact import ContactState
 from holdfast.detector import detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.sensors import sensor
 
 from . import build
-from .test_session import wait_for
+from .build import wait_for
 
 pytestmark = pytest.mark.slow  # servers and sockets
 
@@ -42,25 +41,19 @@ def packets_of(recording, epoch=EPOCH):
 
 
 def garbage(packet, generator):
-    """An invalid packet: cut, corrupted, with another number of taxels, or random bytes."""
-    text = bytearray(packet)
-    kind = generator.randrange(6)
-    if kind == 0:
-        return bytes(text[: generator.randrange(len(text))])
-    if kind == 1:
-        for _ in range(1 + generator.randrange(8)):
-            text[generator.randrange(len(text))] = generator.randrange(256)
-        return bytes(text)
-    if kind == 2:
-        return packet.replace(b'"data":"', b'"data":"ZZZZ,', 1)
-    if kind == 3:
-        return b'{"message": 5, "time": 1e308, "1": {"data": "8000", "taxels": 1}}'
-    if kind == 4:
-        return b"[" * generator.randrange(2000)
-    return generator.randbytes(generator.randrange(300))
+    """An invalid packet: cut, of another number of taxels, or random bytes."""
+    odd = b'{"message": 5, "time": 1e308, "1": {"data": "8000", "taxels": 1}}'
+    return generator.choice(
+        [
+            packet[: generator.randrange(len(packet))],
+            packet.replace(b'"data":"', b'"data":"ZZZZ,', 1),
+            odd,
+            b"[" * generator.randrange(2000),
+            generator.randbytes(generator.randrange(300)),
+        ]
+    )
 
 
-@pytest.mark.slow
 def test_ten_thousand_invalid_packets_do_no_harm():
     recording = build.grasp()
     packets = packets_of(recording)
@@ -104,48 +97,11 @@ def test_a_restarted_server_keeps_the_tare_and_the_clock():
     finally:
         session.stop()
     assert session.failure is None
-    estimates = [
-        d.estimate for update in updates for d in update.estimates if update.arrival is not None
-    ]
-    times = [one.time for one in estimates]
-    assert (np.diff(times) > 0).all()
-    notices = [
-        n for update in updates if update.arrival is not None for n in update.arrival.notices
-    ]
-    assert any("connection lost" in notice for notice in notices)
+    updates = [update for update in updates if update.arrival is not None]
+    estimates = [one.estimate for update in updates for one in update.estimates]
+    assert (np.diff([one.time for one in estimates]) > 0).all()
+    assert any("connection lost" in text for x in updates for text in x.arrival.notices)
     # The tare was kept: the force is that of the recording, and no finger waits for a new one.
     expected = detect(build.model(), recording).fingers["thumb"].force[899]
     np.testing.assert_allclose(estimates[-1].fingers["thumb"].force, expected)
     assert any(one.fingers["thumb"].state is not ContactState.UNKNOWN for one in estimates[-100:])
-
-
-def test_a_module_of_another_size_is_unknown_until_its_size_is_right():
-    recording = build.grasp()
-    packets = packets_of(recording)
-    one = build.arrivals_of(recording)[500]
-    sensors = {name: module.sensor for name, module in recording.modules.items()}
-    smaller = XelaEncoder({**sensors, "thumb": sensor("uskin-4x6")})
-    samples = {**one.samples, "thumb": one.samples["thumb"][:24]}
-    odd = smaller.packet(samples, EPOCH + one.time, EPOCH + one.time)
-    updates = []
-    with (
-        server([*packets[:500], odd, *packets[501:600]]) as (port, _),
-        open_source(f"xela://127.0.0.1:{port}?{NAMES}") as source,
-    ):
-        session = Session(StreamDetector(build.model(), source))
-        session.add_listener(updates.append)
-        session.start()
-        wait_for(lambda: session.n_packets == 600)
-        session.stop()
-    estimates = [d for update in updates if update.arrival for d in update.estimates]
-    odd_ones = [  # a busy machine may add LATE, of any finger
-        k for k, d in enumerate(estimates)
-        if Fault.TAXEL_COUNT in d.estimate.fingers["thumb"].faults
-    ]  # fmt: skip
-    assert odd_ones
-    for k in odd_ones:
-        fingers = estimates[k].estimate.fingers
-        assert fingers["thumb"].state is ContactState.UNKNOWN
-        assert Fault.TAXEL_COUNT not in fingers["index"].faults
-    later = [d.estimate.fingers["thumb"] for d in estimates[odd_ones[-1] + 1 :]]
-    assert any(thumb.state is not ContactState.UNKNOWN for thumb in later)

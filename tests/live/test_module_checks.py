@@ -96,19 +96,10 @@ def test_without_a_hold_there_is_no_drift(amplitude):
 
 def test_faulty_readings_are_findings():
     assert faulty_readings("index", 2, 1000, []) == []
-    assert faulty_readings("index", 25, 1000, [2, 7]) == [
-        (
-            "index",
-            "invalid",
-            "25 samples (2.5 %) have a reading that cannot be true, of one taxel, which is left "
-            "out: is a magnetometer read before it is ready?",
-        ),
-        (
-            "index",
-            "stuck",
-            "no change of taxels 2, 7, or of one axis, from some time on: left out since",
-        ),
-    ]
+    invalid, stuck = faulty_readings("index", 25, 1000, [2, 7])
+    assert (invalid[:2], stuck[:2]) == (("index", "invalid"), ("index", "stuck"))
+    assert "25 samples (2.5 %)" in invalid[2]
+    assert "taxels 2, 7" in stuck[2]
 
 
 def test_a_stuck_axis_is_found_in_a_recording(tmp_path):
@@ -120,4 +111,4 @@ def test_a_stuck_axis_is_found_in_a_recording(tmp_path):
     report = content_of(path, Tare.parse("0.5"))
     assert report["modules"]["thumb"]["faults"].keys() == {"stuck"}
     [text] = [each["text"] for each in report["findings"] if each["kind"] == "stuck"]
-    assert text.startswith("no change of taxel 3, or of one axis")
+    assert "taxel 3" in text

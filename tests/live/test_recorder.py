@@ -1,12 +1,12 @@
 import contextlib
 import math
 import os
-import re
 import shutil
 import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,10 +21,10 @@ from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.live import recorder as module
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
+from live.build import PATIENCE, wait_for
 
 ANYSKIN = sensor("anyskin")
 TWO = {"thumb": ANYSKIN, "index": ANYSKIN}
-PATIENCE = 30.0
 
 
 def readings(k, number=np.uint16):
@@ -37,34 +37,9 @@ def arrival(k, *names, time=None, **fields):
     return Arrival(at, samples, received=at, **fields)
 
 
-def until(condition):
-    """Wait until the thread has done its work, and fail if it does not."""
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < end, "the condition never became true"
-        time.sleep(0.01)
-
-
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "a.mcap"
-
-
-@pytest.fixture
-def stuck(monkeypatch):
-    """A disk that writes nothing until the event is set."""
-    go, entered = threading.Event(), threading.Event()
-    append = RecordingWriter.append
-
-    def slow(self, *given):
-        entered.set()
-        go.wait(PATIENCE)
-        append(self, *given)
-
-    monkeypatch.setattr(RecordingWriter, "append", slow)
-    go.entered = entered
-    yield go
-    go.set()
 
 
 def test_arrivals_are_recorded_with_the_times_of_each_module(path):
@@ -86,8 +61,7 @@ def test_the_status_shows_the_progress(path):
         assert recorder.status.seconds == 0.0
         for k in [*range(100), *range(150, 200)]:
             recorder.put(arrival(k, "thumb", n_lost=k == 150, n_refused=2 * (k == 7)))
-        until(lambda: recorder.status.n_samples == 150)
-        until(lambda: recorder.status.rate > 0)
+        wait_for(lambda: recorder.status.n_samples == 150 and recorder.status.rate > 0)
         recorder.add_marker("one")
     status = recorder.status
     assert status.seconds == pytest.approx(1.99)
@@ -95,33 +69,6 @@ def test_the_status_shows_the_progress(path):
     assert (status.n_gaps, status.n_lost, status.n_refused, status.n_dropped) == (1, 1, 2, 0)
     assert (status.n_markers, status.n_bytes) == (1, path.stat().st_size)
     assert (status.failure, recorder.failed) == ("", False)
-
-
-def test_gaps_are_found_from_the_measured_rate(path):
-    with Recorder(path, TWO) as recorder:  # 10 Hz, where the sensor promises 100 Hz
-        for k in range(50):
-            recorder.put(arrival(k, time=k / 10 + (k > 30)))
-    assert recorder.status.n_gaps == load_recording(path).modules["thumb"].n_gaps == 1
-
-
-def test_everything_is_on_disk_soon_although_the_source_is_silent(path):
-    with Recorder(path, TWO) as recorder:
-        recorder.put(arrival(0))
-        recorder.put(arrival(1))
-        recorder.add_marker("silence")
-        until(lambda: recorder.status.n_markers)
-        copy = path.with_name("copy.mcap")
-
-        def has_all():
-            shutil.copy(path, copy)
-            with contextlib.suppress(RecordingError):  # it may be copied in mid-write
-                return bool(load_recording(copy).markers)
-            return False
-
-        until(has_all)
-        recording = load_recording(copy)
-    assert recording.modules["thumb"].times.tolist() == [0.0, 0.01]
-    assert recording.markers == ((0.01, "silence"),)
 
 
 def test_markers_have_the_times_at_which_they_were_set(path):
@@ -221,48 +168,30 @@ def test_samples_that_cannot_be_stored_are_dropped_and_reported(path):
     assert thumb.readings[:, 0, 0].tolist() == [0, 7, 8, 9]
     assert thumb.readings.dtype == np.uint16
     assert recorder.status.n_dropped == len(wrong)
-    assert (0.0, "note: a sample of thumb cannot be stored: dropped") in load_recording(
-        path
-    ).markers
+    assert any(t == 0.0 and "sample of thumb" in text for t, text in load_recording(path).markers)
 
 
 def test_half_precision_cannot_be_stored(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(Arrival(0.0, {"thumb": readings(1, np.float16)}, received=0.0))
-        recorder.put(Arrival(1.0, {"thumb": readings(1, np.float32)}, received=1.0))
+        recorder.put(arrival(100))
     assert recorder.status.n_dropped == 1
-    assert load_recording(path).modules["thumb"].readings.dtype == np.float32
+    assert load_recording(path).modules["thumb"].readings.dtype == np.uint16
 
 
-def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, stuck, monkeypatch):
-    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 50)
+def test_everything_is_on_disk_soon_although_the_source_is_silent(path):
     with Recorder(path, TWO) as recorder:
         recorder.put(arrival(0))
-        assert stuck.entered.wait(PATIENCE)
-        for k in range(1, 201):
-            recorder.put(arrival(k))  # would block for ever if it waited
-        assert recorder.status.n_dropped == 150
-        stuck.set()
-        until(lambda: recorder.status.n_samples == 51)
-        recorder.put(arrival(300))
-    recording = load_recording(path)
-    assert recording.modules["thumb"].readings[:, 0, 0].tolist() == [*range(51), 300]
-    assert (0.5, "note: 150 samples dropped: the disk is too slow") in recording.markers
+        recorder.add_marker("silence")
+        copy = path.with_name("copy.mcap")
 
+        def has_all():
+            shutil.copy(path, copy)
+            with contextlib.suppress(RecordingError):  # it may be copied in mid-write
+                return load_recording(copy).markers == ((0.0, "silence"),)
+            return False
 
-def test_more_markers_than_samples_are_queued_but_a_limited_number(path, stuck, monkeypatch):
-    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 5)
-    monkeypatch.setattr(module, "_MAX_QUEUED_MARKERS", 3)
-    with Recorder(path, TWO) as recorder:
-        recorder.put(arrival(0))
-        assert stuck.entered.wait(PATIENCE)
-        for k in range(1, 10):
-            recorder.put(arrival(k))
-        for k in range(10):
-            recorder.add_marker(f"mark {k}")
-        stuck.set()
-    texts = [text for _, text in load_recording(path).markers if text.startswith("mark")]
-    assert texts == ["mark 0", "mark 1", "mark 2"]
+        wait_for(has_all)
 
 
 def test_with_wait_no_sample_is_dropped(path, monkeypatch):
@@ -273,10 +202,38 @@ def test_with_wait_no_sample_is_dropped(path, monkeypatch):
     assert (recorder.status.n_dropped, recorder.status.n_samples) == (0, 100)
 
 
+def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, monkeypatch):
+    monkeypatch.setattr(module, "MAX_QUEUED_ARRIVALS", 50)
+    monkeypatch.setattr(module, "_MAX_QUEUED_MARKERS", 3)
+    go_on, entered, append = threading.Event(), threading.Event(), RecordingWriter.append
+
+    def slow(self, *given):
+        entered.set()
+        go_on.wait(PATIENCE)
+        append(self, *given)
+
+    monkeypatch.setattr(RecordingWriter, "append", slow)
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
+        assert entered.wait(PATIENCE)
+        for k in range(1, 201):
+            recorder.put(arrival(k))  # would block for ever if it waited
+        for k in range(10):
+            recorder.add_marker(f"mark {k}")
+        assert recorder.status.n_dropped == 150
+        go_on.set()
+        wait_for(lambda: recorder.status.n_samples == 51)
+        recorder.put(arrival(300))
+    recording = load_recording(path)
+    assert recording.modules["thumb"].readings[:, 0, 0].tolist() == [*range(51), 300]
+    texts = [text for _, text in recording.markers]
+    assert [text for text in texts if text.startswith("mark")] == ["mark 0", "mark 1", "mark 2"]
+    assert any("150 samples dropped" in text for text in texts)
+
+
 def test_a_closed_recorder_drops_arrivals(path):
-    recorder = Recorder(path, TWO)
-    recorder.put(arrival(0))
-    recorder.close()
+    with Recorder(path, TWO) as recorder:
+        recorder.put(arrival(0))
     recorder.put(arrival(1), wait=True)
     recorder.add_marker("late")
     recorder.close()
@@ -286,42 +243,26 @@ def test_a_closed_recorder_drops_arrivals(path):
 
 def test_an_existing_file_is_kept_unless_forced(path):
     path.write_text("mine")
-    with pytest.raises(OutputError, match=r"a\.mcap exists already"):
-        Recorder(path, TWO)
-    assert path.read_text() == "mine"
+    for options in ({}, {"metadata": {"a": object()}, "force": True}):
+        with pytest.raises((OutputError, RecordingError)):
+            Recorder(path, TWO, **options)
+        assert path.read_text() == "mine"
     with Recorder(path, TWO, force=True) as recorder:
         recorder.put(arrival(0))
     assert load_recording(path).complete
 
 
-def test_metadata_that_cannot_be_stored_are_refused(path):
-    with pytest.raises(RecordingError, match="plain JSON values"):
-        Recorder(path, TWO, metadata={"a": object()})
-    assert not path.exists()
-
-
-def test_a_removed_file_is_reported(path):
+@pytest.mark.parametrize("harm", [Path.unlink, lambda path: os.truncate(path, 100)])
+def test_a_file_that_another_program_harms_is_reported(path, harm):
     recorder = Recorder(path, TWO)
-    path.unlink()
-    until(lambda: recorder.failed)
     recorder.put(arrival(0))
-    message = f"cannot write {path}: it was removed while it was recorded"
-    assert recorder.status.failure == message
-    with pytest.raises(OutputError, match=re.escape(message)):
+    wait_for(lambda: recorder.status.n_samples == 1)
+    harm(path)
+    recorder.put(arrival(1))
+    with pytest.raises(OutputError, match=f"^cannot write {path}: "):
         recorder.close()
-    assert recorder.status.n_dropped == 1
-
-
-def test_a_file_that_is_cut_meanwhile_is_reported(path):
-    recorder = Recorder(path, {"thumb": sensor("anyskin")})
-    recorder.put(Arrival(0.0, {"thumb": np.zeros((5, 3))}, received=0.0))
-    os.truncate(path, 100)
-    with pytest.raises(OutputError) as refused:
-        recorder.close()
-    assert str(refused.value) == (
-        f"cannot write {path}: another program changed it while it was recorded"
-    )
-    assert path.stat().st_size == 100
+    assert recorder.failed
+    assert not path.exists() or path.stat().st_size == 100
 
 
 def test_with_fsync_what_was_written_a_second_ago_is_on_the_disk(path, monkeypatch):
@@ -336,22 +277,18 @@ def test_with_fsync_what_was_written_a_second_ago_is_on_the_disk(path, monkeypat
     monkeypatch.setattr(os, "fsync", record)
     monkeypatch.setattr(module, "SYNC_INTERVAL", 0.1)
     monkeypatch.setattr(module, "FLUSH_INTERVAL", 0.02)
-    with Recorder(path, {"thumb": sensor("anyskin")}, fsync=True) as recorder:
-        for k in range(40):
-            recorder.put(Arrival(k / 100, {"thumb": np.zeros((5, 3))}, received=k / 100))
-            time.sleep(0.01)
-        deadline = time.monotonic() + 60
-        while waits[-1][1] < recorder.status.n_bytes or recorder.status.n_samples < 40:
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+    with Recorder(path, {"thumb": ANYSKIN}, fsync=True) as recorder:
+        for k in range(3):
+            n_waits = len(waits)
+            recorder.put(arrival(k))
+            wait_for(lambda n_waits=n_waits: len(waits) > n_waits)
+        wait_for(lambda: waits[-1][1] >= recorder.status.n_bytes and recorder.status.n_samples == 3)
     assert waits[-1][1] == path.stat().st_size
-    assert len(waits) >= 5  # the file, its folder, while recording, and the end
-    assert module.FLUSH_INTERVAL + module.SYNC_INTERVAL < 1.0
 
 
 def test_with_fsync_there_is_less_than_a_second_between_two_waits(path, monkeypatch):
     """By a clock of the test: the steps of the recorder's thread, one flush interval apart."""
-    recorder = Recorder(path, {"thumb": sensor("anyskin")}, fsync=True)
+    recorder = Recorder(path, {"thumb": ANYSKIN}, fsync=True)
     recorder._closing = True
     recorder._wake.set()
     recorder._thread.join()
@@ -368,69 +305,42 @@ def test_with_fsync_there_is_less_than_a_second_between_two_waits(path, monkeypa
     recorder._writer.close()
 
 
-@pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
-def test_the_system_is_called_to_write_to_the_disk(path):
-    """The last call that writes to the file is followed by one that waits for the disk."""
-    code = f"""
-import numpy as np
-from holdfast.live.recorder import Recorder
-from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
-
-with Recorder({str(path)!r}, {{"thumb": sensor("anyskin")}}, fsync=True) as recorder:
-    recorder.put(Arrival(0.0, {{"thumb": np.zeros((5, 3))}}, received=0.0))
-"""
-    words = ["strace", "-f", "-y", "-e", "trace=write,fsync", sys.executable, "-c", code]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-    calls = [line for line in done.stderr.splitlines() if f"{path.name}>" in line]
-    kinds = [re.search(r"(write|fsync)\(", line)[1] for line in calls]
-    assert kinds[-1] == "fsync"
-    assert kinds.count("fsync") >= 2
-    assert kinds[0] == "write"
-
-
 def test_an_error_in_the_thread_is_raised_by_close(path, monkeypatch):
     monkeypatch.setattr(RecordingWriter, "append", lambda *_: 1 / 0)
     recorder = Recorder(path, TWO)
     recorder.put(arrival(0))
-    until(lambda: recorder.failed)
+    wait_for(lambda: recorder.failed)
     with pytest.raises(ZeroDivisionError):
         recorder.close()
 
 
 FULL = """
-import resource, sys, time
+import resource, sys
 import numpy as np
-from holdfast.errors import OutputError
+from holdfast.devices.sources import Arrival
 from holdfast.live.recorder import Recorder
 from holdfast.sensors import sensor
-from holdfast.devices.sources import Arrival
 
 recorder = Recorder(sys.argv[1], {"thumb": sensor("anyskin")})
 noise = np.random.default_rng(0)
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, resource.RLIM_INFINITY))
-end = time.monotonic() + 30
-for k in range(10**9):
+for k in range(100_000):
     values = noise.integers(0, 65535, (5, 3)).astype(np.uint16)
     values[0, 0] = k
     recorder.put(Arrival(k / 100, {"thumb": values}, received=0.0), wait=True)
-    if recorder.failed or time.monotonic() > end:
+    if recorder.failed:
         break
 resource.setrlimit(resource.RLIMIT_FSIZE, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
-try:
-    recorder.close()
-except OutputError as error:
-    print(error)
+recorder.close()
 """
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs limits of POSIX")
 def test_a_full_disk_keeps_what_was_written(path):
     """Even if there is space again at the end: closing would make the file look damaged."""
-    done = subprocess.run(
-        [sys.executable, "-c", FULL, str(path)], capture_output=True, text=True, check=True
-    )
-    assert done.stdout == f"cannot write {path}: File too large\n"
+    words = [sys.executable, "-c", FULL, str(path)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert f"OutputError: cannot write {path}: " in done.stderr
     recording = load_recording(path)
     assert not recording.complete
     thumb = recording.modules["thumb"]
@@ -439,7 +349,7 @@ def test_a_full_disk_keeps_what_was_written(path):
 
 
 def test_the_time_of_the_session_is_that_of_the_quickest_arrival(tmp_path, monkeypatch):
-    with Recorder(tmp_path / "a.mcap", {"thumb": sensor("anyskin")}) as recorder:
+    with Recorder(tmp_path / "a.mcap", {"thumb": ANYSKIN}) as recorder:
         assert math.isnan(recorder.session_time())
         for now, late in ((5.0, 0.3), (6.0, 0.1), (7.0, 0.2)):  # on their way
             samples = {"thumb": np.zeros((5, 3))}

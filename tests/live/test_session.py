@@ -1,33 +1,21 @@
 import gc
-import itertools
 import sys
 import threading
-import time
 from functools import partial
 
 import pytest
 
-from holdfast.contact import ContactState, Fault
 from holdfast.detector import detect
 from holdfast.errors import ModelError, SourceError, StreamError
 from holdfast.live.session import SWITCH_INTERVAL, InterpreterSettings, Session
 from holdfast.live.stream_detector import StreamDetector
 
 from . import build
-
-PATIENCE = 30.0
+from .build import wait_for
 
 
 def session_of(source):
     return Session(StreamDetector(build.model(), source))
-
-
-def wait_for(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail("the condition never became true")
-        time.sleep(0.005)
 
 
 @pytest.fixture
@@ -56,32 +44,9 @@ def test_listeners_receive_all_updates_in_order(start):
     expected = detect(build.model(), recording)
     assert [d.estimate.state.code for d in estimates] == expected.hand.tolist()
     assert session.n_packets == len(expected.hand)
+    latency = session.latency()
+    assert 0 < latency.p50 <= latency.p99 <= latency.largest
     assert session.failure is None
-
-
-def test_events_are_the_changes_of_state(start):
-    updates = []
-    session = start(build.Script.of(build.grasp()), updates.append)
-    wait_for(lambda: session.ended)
-    events = [event for update in updates for event in update.events if event.finger == "hand"]
-    assert {event.state for event in events} == set(ContactState) - {ContactState.UNKNOWN}
-    assert all(one.state is two.previous for one, two in itertools.pairwise(events))
-
-
-def test_silence_is_reported_once_and_ends_with_the_next_sample(start):
-    recording = build.grasp()
-    arrivals = build.arrivals_of(recording)
-    steps = [*arrivals[:400], None, None, None, *arrivals[400:]]
-    updates = []
-    session = start(build.Script.of(recording, steps), updates.append)
-    wait_for(lambda: session.ended)
-    gaps = [s for s in updates if s.arrival is None and s.estimates]
-    assert len(gaps) == 1
-    estimate = gaps[0].estimates[0].estimate
-    assert all(f.faults == (Fault.PACKET_GAP,) for f in estimate.fingers.values())
-    assert not session.stream.silent
-    after = updates[updates.index(gaps[0]) + 1].estimates[0].estimate
-    assert after.fingers["thumb"].state is not ContactState.UNKNOWN
 
 
 def test_the_module_with_most_samples_gives_the_number_of_packets(start):
@@ -111,7 +76,7 @@ def test_a_tare_that_timed_out_is_not_taken_later(monkeypatch):
     session = session_of(build.Script.of(recording))
     taken = []
     monkeypatch.setattr(session.stream, "restart_tare", lambda: taken.append(1))
-    with pytest.raises(SourceError, match=r"^the source does not answer: no tare can be taken$"):
+    with pytest.raises(SourceError, match="the source does not answer"):
         retare(session)
     session.start()
     wait_for(lambda: session.ended)
@@ -142,39 +107,27 @@ def test_the_threshold_is_changed_in_the_session(start):
     set_threshold(session, None)
     own = build.model().finger("thumb").stable.threshold
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
-    with pytest.raises(ValueError, match=r"^a threshold from 0 to 1 expected, 2 given$"):
+    with pytest.raises(ValueError, match="2 given"):
         set_threshold(session, 2)
     assert dict(session.stream.thresholds) == dict.fromkeys(build.FINGERS, own)
 
 
-def test_no_threshold_after_the_end(start):
-    session = start(build.Script.of(build.grasp()))
-    wait_for(lambda: session.ended)
-    message = r"^the source has ended: the threshold was not changed$"
-    with pytest.raises(SourceError, match=message):
-        set_threshold(session, 0.5)
-
-
-def test_no_tare_while_no_samples_arrive(start):
-    recording = build.grasp()
-    steps = [*build.arrivals_of(recording)[:200], None]
-    session = start(build.Script.of(recording, steps, patient=True))
+def test_no_tare_while_no_samples_arrive_and_no_change_after_the_end(start):
+    steps = [*build.arrivals_of(build.grasp())[:200], None]
+    session = start(build.Script.of(build.grasp(), steps, patient=True))
     wait_for(lambda: session.stream.silent)
-    with pytest.raises(SourceError, match=r"^no samples arrive: no tare can be taken$"):
+    with pytest.raises(SourceError, match="no samples arrive"):
         retare(session)
-
-
-def test_no_tare_after_the_end(start):
     session = start(build.Script.of(build.grasp(), []))
     wait_for(lambda: session.ended)
-    with pytest.raises(SourceError, match=r"^the source has ended: no tare can be taken$"):
-        retare(session)
+    for change in (retare, lambda session: set_threshold(session, 0.5)):
+        with pytest.raises(SourceError, match="the source has ended"):
+            change(session)
 
 
 def test_a_failure_is_kept_and_ends_the_session(start):
-    recording = build.grasp()
-    slow = [one._replace(time=one.time * 3) for one in build.arrivals_of(recording)]
-    source = build.Script.of(recording, slow)
+    slow = [one._replace(time=one.time * 3) for one in build.arrivals_of(build.grasp())]
+    source = build.Script.of(build.grasp(), slow)
     session = Session(StreamDetector(build.model(), source, strict=True))
     session.start()
     wait_for(lambda: session.ended)
@@ -190,15 +143,6 @@ def test_stopping_closes_the_source_and_leaves_no_thread():
     session.stop()
     assert source.n_closed >= 1
     assert not [t for t in threading.enumerate() if t.name == "holdfast-detector"]
-
-
-def test_latencies_are_those_of_the_estimates(start):
-    session = session_of(build.Script.of(build.grasp(), []))
-    assert session.latency().p99 != session.latency().p99
-    session = start(build.Script.of(build.grasp()))
-    wait_for(lambda: session.ended)
-    latency = session.latency()
-    assert 0 < latency.p50 <= latency.p99 <= latency.largest
 
 
 def test_a_removed_listener_is_not_called(start):
@@ -237,12 +181,6 @@ def test_the_settings_of_python_are_those_of_before_when_the_last_session_stops(
     second.stop()
     assert sys.getswitchinterval() == pytest.approx(own_settings)
     assert gc.get_freeze_count() <= n_frozen
-
-
-def test_a_session_that_was_not_started_changes_nothing(own_settings):
-    session = session_of(build.Script.of(build.grasp(), []))
-    session.stop()
-    assert sys.getswitchinterval() == pytest.approx(own_settings)
 
 
 def test_settings_of_the_program_meanwhile_stay(own_settings):

@@ -33,10 +33,8 @@ def first_change(times, rate=RATE):
 def test_another_rate_is_reported_within_a_second(rate, factor):
     found, notices = first_change(times_at((rate, 2.0), (factor * rate, 3.0)), rate)
     assert 2.0 < found < 3.05
-    assert len(notices) == 1
-    assert notices[0].endswith(
-        f"samples per second, {rate:.3g} at the start: open the source again"
-    )
+    (notice,) = notices
+    assert f"{rate:.3g} at the start" in notice
 
 
 @pytest.mark.parametrize("factor", [0.85, 1.0, 1.15])

@@ -29,16 +29,11 @@ def test_texts_of_numbers_become_numbers(text, value):
 
 
 @pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        (["x"], "--set KEY=VALUE expected, 'x' given"),
-        (["=1"], "--set KEY=VALUE expected, '=1' given"),
-        (["x=1", "x=2"], "--set: x is given twice"),
-        (["object=ball"], "--set: object is given twice"),
-    ],
+    ("settings", "name"),
+    [(["x"], "'x'"), (["=1"], "'=1'"), (["x=1", "x=2"], "x is"), (["object=ball"], "object is")],
 )
-def test_settings_of_another_form(settings, message):
-    with pytest.raises(ValueError, match=f"^{message}$"):
+def test_settings_of_another_form(settings, name):
+    with pytest.raises(ValueError, match=f"^--set.*{name}"):
         typed_metadata("can", "", "", settings)
 
 
@@ -60,7 +55,7 @@ def test_a_recording_gives_its_name(tmp_path):
     assert recording_path("data/grasp.parquet", tmp_path / "new", "can", force=False) == (
         tmp_path / "new" / "grasp.mcap"
     )
-    with pytest.raises(ValueError, match=r"new.csv: NAME.mcap expected \(holdfast import conver"):
+    with pytest.raises(ValueError, match=r"new.csv: .*holdfast import"):
         recording_path("xela://auto", tmp_path / "new.csv", "", force=False)
 
 
@@ -75,7 +70,7 @@ def test_a_file_without_samples_is_removed(tmp_path, source):
     recorder = create_recorder(source, tmp_path / "new" / "a.mcap", {})
     assert recorder.path.exists()
     with (
-        pytest.raises(SourceError, match="sent no samples: nothing was recorded"),
+        pytest.raises(SourceError, match="sent no samples"),
         recording(source, recorder),
     ):
         pass

@@ -26,6 +26,11 @@ def detected(recording, model=None, steps=None, **options):
     return detector, estimates + detector.finish().estimates
 
 
+def slower(factor):
+    modules = build.grasp().modules.items()
+    return Recording("slow", {k: replace(m, times=m.times * factor) for k, m in modules})
+
+
 def check_equal(estimates, expected):
     for name, trace in expected.fingers.items():
         mine = [d.estimate.fingers[name] for d in estimates if name in d.updated_fingers]
@@ -42,10 +47,7 @@ def test_estimates_are_those_of_the_recording_sample_by_sample():
 
 
 def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
-    recording = build.grasp()
-    slow = Recording(
-        "slow", {name: replace(m, times=m.times * 2.5) for name, m in recording.modules.items()}
-    )
+    slow = slower(2.5)
     detector, estimates = detected(slow)
     assert detector.resampled
     expected = detect(build.model(), resample(slow, 150.0))
@@ -60,13 +62,8 @@ def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
 
 
 def test_strict_refuses_a_source_of_another_rate():
-    recording = build.grasp()
-    slow = Recording(
-        "slow", {name: replace(m, times=m.times * 2) for name, m in recording.modules.items()}
-    )
-    text = r"^75 Hz given, the model expects 150 Hz within 20 % \(--rate resample accepts it\)$"
-    with pytest.raises(ModelError, match=text):
-        detected(slow, strict=True)
+    with pytest.raises(ModelError, match=r"75 Hz given.*--rate resample"):
+        detected(slower(2), strict=True)
 
 
 def test_arrivals_are_buffered_until_the_rate_is_known():
@@ -106,30 +103,21 @@ def test_a_fault_of_the_transport_makes_its_finger_unknown_until_the_next_sample
     assert all(finger.faults == () for finger in after.fingers.values())
 
 
-def test_in_silence_every_finger_is_unknown():
-    recording = build.grasp()
-    detector = StreamDetector(build.model(), build.Script.of(recording))
+def test_in_silence_every_finger_is_unknown_until_the_next_sample():
+    arrivals = build.arrivals_of(build.grasp())
+    detector = StreamDetector(build.model(), build.Script.of(build.grasp()))
     assert detector.update(None, silent=True).estimates == []
-    for arrival in build.arrivals_of(recording)[:500]:
+    for arrival in arrivals[:500]:
         detector.update(arrival)
     (one,) = detector.update(None, silent=True).estimates
     assert one.updated_fingers == build.FINGERS
-    assert one.estimate.state is ContactState.UNKNOWN
     for finger in one.estimate.fingers.values():
         assert (finger.state, finger.reason) == (ContactState.UNKNOWN, Reason.GAP)
         assert finger.faults == (Fault.PACKET_GAP,)
-
-
-def test_a_notice_does_not_end_the_silence():
-    recording = build.grasp()
-    arrivals = build.arrivals_of(recording)
-    detector = StreamDetector(build.model(), build.Script.of(recording))
-    for arrival in arrivals[:500]:
-        detector.update(arrival)
-    detector.update(None, silent=True)
-    (one,) = detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])).estimates
-    assert {finger.state for finger in one.estimate.fingers.values()} == {ContactState.UNKNOWN}
-    assert one.estimate.state is ContactState.UNKNOWN
+    (odd,) = detector.update(build.notice_arrival("odd", thumb=[Fault.TAXEL_COUNT])).estimates
+    for estimate in (one.estimate, odd.estimate):  # a notice does not end the silence
+        assert estimate.state is ContactState.UNKNOWN
+        assert {finger.state for finger in estimate.fingers.values()} == {ContactState.UNKNOWN}
     (back,) = detector.update(arrivals[500]).estimates
     assert all(finger.faults == () for finger in back.estimate.fingers.values())
 
@@ -185,7 +173,7 @@ def test_a_tare_in_contact_is_refused_and_one_without_contact_restarts():
     assert (thumb.state, thumb.reason) == (ContactState.UNKNOWN, Reason.TARE)
     for arrival in arrivals[201:600]:
         detector.update(arrival)
-    with pytest.raises(StreamError, match=r"^thumb, index, middle in contact: open the hand, the"):
+    with pytest.raises(StreamError, match=r"^thumb, index, middle in contact"):
         detector.restart_tare()
 
 
@@ -201,18 +189,9 @@ def test_tared_readings_begin_at_zero():
     assert all(np.abs(values).max() < 10 for values in tared.values())
 
 
-def test_modules_that_the_model_does_not_use_are_ignored():
-    recording = build.grasp()
-    steps = build.arrivals_of(recording)
-    palm = np.zeros((4, 3))
-    more = [one._replace(samples={**one.samples, "palm/1": palm}) for one in steps]
-    _, estimates = detected(recording, steps=more)
-    check_equal(estimates, detect(build.model(), recording))
-
-
 def test_a_tare_by_interval_is_refused():
     model = msgspec.structs.replace(build.model(), tare="0:1")
-    with pytest.raises(ModelError, match=r"^the model's tare is the interval 0:1 s of a recordin"):
+    with pytest.raises(ModelError, match="0:1"):
         StreamDetector(model, build.Script.of(build.grasp()))
 
 
@@ -253,39 +232,22 @@ def test_a_source_without_samples_is_silent():
     stream, _ = read_times(source, 500)
     assert not stream.silent
     found = []
-    end = time.monotonic() + 30
-    while not stream.silent and time.monotonic() < end:
-        found += stream.read().estimates
+    build.wait_for(lambda: found.extend(stream.read().estimates) or stream.silent)
     (silence,) = found
     assert {one.state for one in silence.estimate.fingers.values()} == {ContactState.UNKNOWN}
     assert stream.read().estimates == []
 
 
-def test_samples_of_unused_modules_do_not_end_the_silence():
-    recording = build.grasp()
-    arrivals = build.arrivals_of(recording)
-    palm = [one._replace(samples={"palm/1": one.samples["thumb"]}) for one in arrivals[500:502]]
-    source = build.Script.of(recording, [*arrivals[:500], None, *palm, arrivals[502]], patient=True)
-    stream, updates = read_times(source, 503)
-    assert stream.silent
-    estimates = [(one, update.arrival) for update in updates for one in update.estimates]
-    assert [arrival is None for _, arrival in estimates[500:]] == [True]
-    stream.read()
-    assert not stream.silent
-
-
 def test_a_source_that_is_not_paced_is_not_silent_because_its_reader_is_slow():
-    recording = build.grasp()
-    arrivals = build.arrivals_of(recording)
+    arrivals = build.arrivals_of(build.grasp())
     steps = [*arrivals[:500], build.notice_arrival("a marker"), arrivals[500]]
-    stream, _ = read_times(build.Script.of(recording, steps), 500)
-    time.sleep(0.15)
+    stream, _ = read_times(build.Script.of(build.grasp(), steps), 500)
+    time.sleep(1.5 * stream.silence_timeout)  # not to be waited for: it is the slow reader
     assert stream.read().estimates == []
     assert not stream.silent
 
 
 def test_in_slow_motion_silence_is_longer():
-    recording = build.grasp()
     asked = []
 
     class Slow(build.Script):
@@ -295,8 +257,8 @@ def test_in_slow_motion_silence_is_longer():
             asked.append(timeout)
             return super().read(0.0)
 
-    read_times(Slow.of(recording), 1)
-    assert asked == [10 * StreamDetector(build.model(), Slow.of(recording)).silence_timeout]
+    stream, _ = read_times(Slow.of(build.grasp()), 1)
+    assert asked == [10 * stream.silence_timeout]
 
 
 def with_palm(recording):
@@ -306,22 +268,28 @@ def with_palm(recording):
     return build.Script.of(more)
 
 
-def test_iterating_gives_the_estimates_of_the_recording():
-    recording = build.grasp()
-    estimates = list(StreamDetector(build.model(), with_palm(recording)))
-    expected = detect(build.model(), recording)
+def test_iterating_ignores_the_modules_that_no_model_uses():
+    stream = StreamDetector(build.model(), with_palm(build.grasp()))
+    assert math.isnan(stream.start)
+    estimates = list(stream)
+    assert stream.start == estimates[0].time < estimates[-1].time
+    expected = detect(build.model(), build.grasp())
     assert [one.state.code for one in estimates] == expected.hand.tolist()
-    for name, trace in expected.fingers.items():
-        mine = [one.fingers[name] for one in estimates]
-        assert all(build.same(one, trace.estimate(k)) for k, one in enumerate(mine))
     assert {name for one in estimates for name in one.fingers} == set(build.FINGERS)
 
 
+def test_samples_of_unused_modules_do_not_end_the_silence():
+    arrivals = build.arrivals_of(build.grasp())
+    palm = arrivals[500]._replace(samples={"palm/1": arrivals[500].samples["thumb"]})
+    steps = [*arrivals[:500], None, palm, arrivals[501]]
+    stream, _ = read_times(build.Script.of(build.grasp(), steps, patient=True), 502)
+    assert stream.silent
+    stream.read()
+    assert not stream.silent
+
+
 def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample():
-    recording = build.grasp()
-    slow = Recording(
-        "slow", {name: replace(m, times=m.times * 2.5) for name, m in recording.modules.items()}
-    )
+    slow = slower(2.5)
     source = with_palm(slow)
     detector = Detector(build.model(), StreamDetector(build.model(), source).fingers)
     with pytest.raises(StreamError, match=r"^finger 'palm/1' given"):
@@ -334,13 +302,6 @@ def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample(
     assert stream.rate == pytest.approx(60.0)
     assert np.median(np.diff(times)) == pytest.approx(1 / 150)
     assert len(times) > 2 * n_instants
-
-
-def test_the_start_is_the_time_of_the_first_estimate():
-    stream = StreamDetector(build.model(), build.Script.of(build.grasp()))
-    assert math.isnan(stream.start)
-    times = [estimate.time for estimate in stream]
-    assert stream.start == times[0] < times[-1]
 
 
 def test_events_are_the_changes_of_the_estimates():

@@ -1,6 +1,6 @@
 """Mouse, keyboard and waiting for tests of the labelling page."""
 
-import re
+from browser import DESKTOP, shows, until
 
 POSITION = """([finger, time, zone]) => {
   const { plot, view, editor } = holdfast, row = plot.rows[editor.fingers.indexOf(finger)];
@@ -10,32 +10,16 @@ POSITION = """([finger, time, zone]) => {
 }"""
 
 
-def until(page, script, arg=None):
-    """Wait until a script returns true.
-
-    `page.wait_for_function` uses `eval`, which the security policy of the page forbids.
-    """
-    for _ in range(600):
-        if page.evaluate(script, arg):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"never true: {script} {arg}")
-
-
-def shows(page, selector, text):
-    """Wait until the text of the first matching element matches a pattern."""
-    for _ in range(600):
-        found = page.evaluate("(at) => document.querySelector(at)?.innerText ?? ''", selector)
-        if re.search(text, found):
-            return
-        page.wait_for_timeout(25)
-    raise AssertionError(f"{selector} shows {found!r}, never {text!r}")
-
-
 def ready(page):
     """Wait until the signals are drawn and the change points are loaded."""
     until(page, "document.body.dataset.painted === '1'")
     until(page, "Object.keys(holdfast.plot.changePoints).length > 0")
+
+
+def opened(visit, service, size=DESKTOP, **options):
+    page = visit(service.url, size, **options)
+    ready(page)
+    return page
 
 
 def position(page, finger, time, zone="force"):
@@ -51,28 +35,23 @@ def click(page, finger, time, zone="force"):
     page.mouse.click(*position(page, finger, time, zone))
 
 
-def drag(page, finger, start, end, zone="force", keys=()):
-    """Drag from one time to another while keys are pressed."""
-    for key in keys:
+def drag(page, finger, start, end, zone="force", key=None):
+    """Drag from one time to another while a key is pressed."""
+    if key:
         page.keyboard.down(key)
-    page.mouse.move(*position(page, finger, start, zone))
+    point(page, finger, start, zone)
     page.mouse.down()
-    page.mouse.move(*position(page, finger, (start + end) / 2, zone))
-    page.mouse.move(*position(page, finger, end, zone))
+    point(page, finger, (start + end) / 2, zone)
+    point(page, finger, end, zone)
     page.mouse.up()
-    for key in keys:
+    if key:
         page.keyboard.up(key)
 
 
 def labels(page, finger="thumb"):
-    """Return the labels of a finger on the page: (start, end, state, cause)."""
+    """Return the labels of a finger on the page: (start, end, state, cause), in 0.1 s."""
     found = page.evaluate("(finger) => holdfast.editor.state.labels[finger]", finger)
-    return [(each["start"], each["end"], each["state"], each["cause"]) for each in found]
-
-
-def rounded(found):
-    """Round the times of labels to 0.1 s, which is more than a pixel."""
-    return [(round(start, 1), round(end, 1), *rest) for start, end, *rest in found]
+    return [(round(x["start"], 1), round(x["end"], 1), x["state"], x["cause"]) for x in found]
 
 
 def saved(page):

@@ -1,23 +1,18 @@
-"""A fake service of the labelling page: its recordings are in memory, and a test controls it.
-
-To look at the page: `PYTHONPATH=tests python -m labelling.page.fake_service [PORT]`.
-"""
+"""A fake service of the labelling page: its recordings are in memory, and a test controls it."""
 
 import asyncio
-import contextlib
-import sys
-import threading
 from importlib import resources
 from pathlib import Path
 
+import msgspec
 import numpy as np
 from aiohttp import web
 
-from holdfast.web.guard import SECURITY_HEADERS
+from browser import PageService
+from holdfast.labelling.server.signals import FingerSignals, Signals
+from holdfast.recordings import Tactile
+from holdfast.sensors import sensor
 
-PAGE = Path(str(resources.files("holdfast.labelling"))) / "page"
-SHARED = Path(str(resources.files("holdfast.web"))) / "static"
-SERIES = ("F_a", "F_x", "F_y", "F_z", "sigma")
 FINGERS = ("thumb", "index", "middle", "ring")
 RATE = 150.0
 NOW = "2026-01-02T03:04:05+00:00"
@@ -29,23 +24,18 @@ def label(start, end, state, cause=None, **fields):
     return {"start": start, "end": end, "state": state, "cause": cause, **defaults, **fields}
 
 
-def signals(n, seed):
-    """Return times, and force and sigma of a finger that grasps, is disturbed, and releases."""
-    rng = np.random.default_rng(seed)
-    times = np.arange(n) / RATE
+def made_up(seconds, fingers):
+    """Return signals of fingers that grasp, are disturbed, and release."""
+    times = np.arange(round(seconds * RATE)) / RATE
     phase = times / times[-1]
     press = np.clip((phase - 1 / 6) * 12, 0, 1) * (1 - np.clip((phase - 5 / 6) * 24, 0, 1))
     shake = np.exp(-(((phase - 0.5) / 0.03) ** 2)) * np.sin(40 * times)
-    force = np.stack([300 * press + 200 * shake, 200 * press, 2000 * press + 150 * shake])
-    force += rng.normal(0, 4, force.shape)
-    sigma = 3 + 100 * np.abs(shake) + rng.exponential(0.5, n)
-    return times, np.vstack([np.linalg.norm(force, axis=0), force, sigma])
-
-
-def extremes(block):
-    """Return (n_series, 2) minimum and maximum of each row, the earlier one first."""
-    places = np.sort([block.argmin(axis=1), block.argmax(axis=1)], axis=0)
-    return np.take_along_axis(block, places.T, axis=1)
+    load = (400 * press + 40 * shake)[:, None, None] * [0.1, 0.1, 1.0]
+    found = {}
+    for seed, finger in enumerate(fingers):
+        noise = np.random.default_rng(seed).normal(0, 2, (len(times), 5, 3))
+        found[finger] = FingerSignals(Tactile(sensor("anyskin"), times, load + noise))
+    return Signals(0.0, float(times[-1]), found)
 
 
 class Recording:
@@ -60,9 +50,8 @@ class Recording:
 
     def __init__(self, name="grasp", seconds=30.0, fingers=FINGERS, **fields):
         self.name, self.fingers = name, list(fingers)
-        n = round(seconds * RATE)
-        self.signals = {finger: signals(n, seed) for seed, finger in enumerate(fingers)}
-        self.end = (n - 1) / RATE
+        self.signals = made_up(seconds, fingers)
+        self.end = self.signals.end
         self.changes = {
             finger: [round(part * self.end / 12, 3) for part in (2, 3, 6, 10)] for finger in fingers
         }
@@ -99,32 +88,15 @@ class Recording:
                      "origin": "file"}  # fmt: skip
         return {"revision": f"r{self.version}", "time": NOW}
 
-    def signals_between(self, start, end, points):
-        """Return the series between two times: every sample, or minima and maxima in order."""
-        exact, fingers = True, {}
-        for finger, (times, values) in self.signals.items():
-            first = max(0, np.searchsorted(times, start) - 1)
-            part = slice(first, np.searchsorted(times, end, side="right") + 1)
-            t, columns = times[part], values[:, part]
-            if len(t) > 2 * points:
-                exact = False
-                n = -(-len(t) // points)
-                edges = np.arange(0, len(t), n)
-                blocks = [columns[:, k : k + n] for k in edges]
-                middles = t[np.minimum(edges + n // 2, len(t) - 1)]
-                t = np.stack([t[edges], middles], axis=1).ravel()
-                columns = np.hstack([extremes(block) for block in blocks])
-            lists = {name: row.tolist() for name, row in zip(SERIES, columns, strict=True)}
-            fingers[finger] = {"t": t.tolist(), **lists}
-        return {"start": start, "end": end, "exact": exact, "fingers": fingers}
 
+class FakeService(PageService):
+    """Fake service of recordings."""
 
-class FakeService:
-    """Fake service on its own port, in its own thread."""
+    folder = Path(str(resources.files("holdfast.labelling"))) / "page"
 
     def __init__(self, *recordings, port=0, media=None):
+        super().__init__(port)
         self.recordings = recordings or (Recording(),)
-        self.port = port
         self.media = media  # path of the file that is sent for every video
         self.saves = []  # bodies of the save requests
         self.requests = []  # (start, end, points) of the requests for signals
@@ -132,59 +104,18 @@ class FakeService:
         self.refusal = None  # (status, text) of the reply to every save
         self.delays = []  # delays of the next replies with signals [s]
 
-    def __enter__(self):
-        ready = threading.Event()
-        self.thread = threading.Thread(target=lambda: asyncio.run(self.run(ready)))
-        self.thread.start()
-        if not ready.wait(20):
-            raise RuntimeError("the fake service did not start")
-        return self
-
-    def __exit__(self, *_):
-        self.loop.call_soon_threadsafe(self.done.set)
-        self.thread.join(20)
-
-    @property
-    def url(self):
-        return f"http://127.0.0.1:{self.port}/"
-
-    async def run(self, ready):
-        self.loop, self.done = asyncio.get_running_loop(), asyncio.Event()
-        runner = web.AppRunner(self.app(), shutdown_timeout=0.2)
-        await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", self.port).start()
-        self.port = runner.addresses[0][1]
-        ready.set()
-        await self.done.wait()
-        await runner.cleanup()
-
-    def app(self):
-        app = web.Application(middlewares=[self.guard])
-        one = r"/api/v1/recordings/{id:\d+}"
-        app.router.add_static("/page", PAGE)
-        app.router.add_static("/web", SHARED)
-        app.router.add_get("/", self.index)
-        app.router.add_get("/api/v1/recordings", self.list)
-        app.router.add_get(one, self.open)
-        app.router.add_get(one + "/signals", self.signals)
-        app.router.add_get(one + "/changes", self.changes)
-        app.router.add_put(one + "/labels", self.save)
-        app.router.add_post(one + "/propose", self.propose)
-        app.router.add_get(r"/media/{id:\d+}/{index:\d+}", self.video)
-        return app
-
-    @web.middleware
-    async def guard(self, request, handler):
-        answer = await handler(request)
-        if not answer.prepared:
-            answer.headers.update(SECURITY_HEADERS)
-        return answer
+    def routes(self):
+        all_of_them = "/api/v1/recordings"
+        one = all_of_them + r"/{id:\d+}"
+        return [
+            ("GET", all_of_them, self.list), ("GET", one, self.open),
+            ("GET", one + "/signals", self.signals), ("GET", one + "/changes", self.changes),
+            ("PUT", one + "/labels", self.save), ("POST", one + "/propose", self.propose),
+            ("GET", r"/media/{id:\d+}/{index:\d+}", self.video),
+        ]  # fmt: skip
 
     def recording(self, request):
         return self.recordings[int(request.match_info["id"])]
-
-    async def index(self, _):
-        return web.FileResponse(PAGE / "index.html")
 
     async def list(self, _):
         entries = [each.entry(index) for index, each in enumerate(self.recordings)]
@@ -199,7 +130,8 @@ class FakeService:
         self.requests.append((start, end, points))
         if self.delays:
             await asyncio.sleep(self.delays.pop(0))
-        return web.json_response(self.recording(request).signals_between(start, end, int(points)))
+        part = self.recording(request).signals.part(start, end, points)
+        return web.Response(body=msgspec.json.encode(part), content_type="application/json")
 
     async def changes(self, request):
         return web.json_response({"fingers": self.recording(request).changes})
@@ -218,31 +150,10 @@ class FakeService:
     async def propose(self, request):
         self.propose_requests.append(await request.json())
         proposals = self.recording(request).rule_proposals
-        if not proposals:
-            return web.json_response({"error": "there are no poses"}, status=422)
-        return web.json_response({"rule": "signal", "proposals": proposals, "doubtful": []})
+        answer = {"proposals": proposals} if proposals else {"error": "there are no poses"}
+        return web.json_response(answer, status=200 if proposals else 422)
 
     async def video(self, _):
         if self.media is None:
             return web.json_response({"error": "there is no such video"}, status=404)
         return web.FileResponse(self.media)
-
-
-def example_recording():
-    """Return a recording with labels, proposals and markers, to look at."""
-    shown = Recording("can-case2-1", markers=[(5.0, "closing"), (7.5, "locked")])
-    for finger in FINGERS:
-        shown.file["labels"][finger] = [label(0, 5, "no_contact"), label(5, 7.5, "unstable")]
-        shown.fields["proposals"][finger] = [
-            label(7.5, 14, "stable", confidence=0.95, author="rule:signal", evidence="settled"),
-            label(14, 16, "unstable", "disturbance", confidence=0.6, author="rule:signal"),
-        ]
-    return shown
-
-
-if __name__ == "__main__":
-    port = int(sys.argv[1]) if sys.argv[1:] else 8766
-    with FakeService(example_recording(), Recording("can-case2-2"), port=port) as service:
-        sys.stderr.write(f"{service.url}\n")
-        with contextlib.suppress(KeyboardInterrupt):
-            service.thread.join()

@@ -1,168 +1,96 @@
 """saver.js and conflicts.js: saving, conflicts, refused saves, and labels after a crash."""
 
-from labelling.page.actions import drag, labels, ready, rounded, saved, shows, until
+import pytest
+
+from browser import shows, until
+from labelling.page.actions import drag, labels, opened, ready, saved
 from labelling.page.fake_service import FakeService, Recording, label
 
 OWN = (8, 12, "stable", None)
-OTHERS = [label(20, 25, "unstable", "slip", author="eve")]
+OTHERS = (20, 25, "unstable", "slip")
 
 
-def test_a_conflict_can_be_resolved_with_the_file(visit, service):
-    page = visit(service.url)
-    ready(page)
-    service.recordings[0].save({"thumb": OTHERS}, note="other note")
+@pytest.mark.parametrize("choice", ["file", "page"])
+def test_another_program_saves_meanwhile(visit, service, choice):
+    page = opened(visit, service)
+    (recording,) = service.recordings
+    recording.save({"thumb": [label(*OTHERS, author="eve")]}, note="other note")
     drag(page, "thumb", 8, 12)
-    shows(page, "#question", r"another page or program[\s\S]*1 label by eve[\s\S]*1 label\.")
+    shows(page, "#question", r"1 label by eve")
     shows(page, "#save-text", "NOT SAVED")
     page.keyboard.press("Escape")  # does not close the dialog
-    page.click("#question button[data-value=file]")
-    assert labels(page) == [(20, 25, "unstable", "slip")]
-    assert page.locator("#note").input_value() == "other note"
+    assert labels(page) == [OWN]
+    page.click(f"#question button[data-value={choice}]")
     saved(page)
-    shows(page, "#save-text", "saved by eve")
-    assert len(service.saves) == 1
-    page.keyboard.press("Control+z")  # restores the labels of this page
-    assert rounded(labels(page)) == [OWN]
+    kept, other = (OTHERS, OWN) if choice == "file" else (OWN, OTHERS)
+    assert labels(page) == [kept]
+    assert page.locator("#note").input_value() == ("other note" if choice == "file" else "")
+    page.keyboard.press("Control+z")  # brings back the other version
+    assert labels(page) == [other]
     saved(page)
-    assert service.recordings[0].file["author"] == "ada"
+    until(page, "holdfast.saver.revision === 'r2' || holdfast.saver.revision === 'r3'")
+    (sent,) = recording.file["labels"]["thumb"]
+    assert sent["state"] == other[2]
     page.reload()
     ready(page)
     assert page.locator("#question").is_hidden()
-    assert rounded(labels(page)) == [OWN]
+    assert labels(page) == [other]
 
 
-def test_a_conflict_can_be_resolved_with_this_page(visit, service):
-    page = visit(service.url)
-    ready(page)
-    service.recordings[0].save({"thumb": OTHERS})
-    drag(page, "thumb", 8, 12)
-    shows(page, "#question", "changed by another page or program")
-    assert service.recordings[0].file["labels"] == {"thumb": OTHERS}
-    page.click("#question button[data-value=page]")
-    saved(page)
-    until(page, "holdfast.saver.revision === 'r2'")
-    (sent,) = service.recordings[0].file["labels"]["thumb"]
-    assert sent["state"] == "stable"
-    page.keyboard.press("Control+z")
-    assert labels(page) == [(20, 25, "unstable", "slip")]
-
-
-def test_two_pages_that_save_the_same_file(visit, service):
-    one = visit(service.url)
-    two = visit(service.url)
-    ready(one)
-    ready(two)
-    drag(one, "thumb", 8, 12)
-    saved(one)
-    drag(two, "index", 8, 12)
-    shows(two, "#question", "1 label by ada")
-    two.click("#question button[data-value=file]")
-    drag(two, "index", 8, 12)
-    saved(two)
-    assert rounded(labels(two)) == [OWN]
-    assert len(service.recordings[0].file["labels"]["index"]) == 1
-
-
-def test_unsaved_labels_are_offered_after_a_crash(visit, service):
+@pytest.mark.parametrize("answer", ["restore", "discard"])
+def test_unsaved_labels_are_offered_after_a_crash(visit, service, answer):
     service.refusal = (500, "the disk is full")
-    page = visit(service.url)
-    ready(page)
+    page = opened(visit, service)
     drag(page, "thumb", 8, 12)
     page.keyboard.press("e")
     page.keyboard.type("half done")
-    shows(page, "#alert", "Not saved: the disk is full")
+    shows(page, "#alert", "the disk is full")
     page.close()
+    service.recordings[0].save({"thumb": [label(*OTHERS)]})
     again = visit(service.url, context=page.context)
-    shows(again, "#question", "1 label of grasp")
+    shows(again, "#question", r"1 label of grasp[\s\S]*changed since then")
     service.refusal = None
-    assert labels(again) == []
-    again.click("#question button[data-value=restore]")
-    assert rounded(labels(again)) == [OWN]
-    assert again.locator("#note").input_value() == "half done"
+    again.click(f"#question button[data-value={answer}]")
     saved(again)
-    assert service.saves[-1]["note"] == "half done"
-    again.reload()
-    ready(again)
-    assert again.locator("#question").is_hidden()
-    assert rounded(labels(again)) == [OWN]
-
-
-def test_labels_of_a_page_that_never_saved_can_be_discarded(visit, service):
-    page = visit(service.url)
-    ready(page)
-    # Neither the delayed save nor the save at closing reaches the service.
-    page.evaluate("""() => {
-      window.setTimeout = () => 0;
-      window.fetch = () => new Promise(() => {});
-    }""")
-    drag(page, "thumb", 8, 12)
-    page.close()
-    assert service.saves == []
-    service.recordings[0].save({"thumb": OTHERS})
-    again = visit(service.url, context=page.context)
-    shows(again, "#question", "changed since then by another page or program")
-    again.click("#question button[data-value=discard]")
-    assert labels(again) == [(20, 25, "unstable", "slip")]
-    again.reload()
-    ready(again)
-    assert again.locator("#question").is_hidden()
+    expected = (OWN, "half done") if answer == "restore" else (OTHERS, "")
+    for _ in range(2):
+        found = labels(again), again.locator("#note").input_value()
+        assert found == ([expected[0]], expected[1])
+        again.reload()
+        ready(again)
+        assert again.locator("#question").is_hidden()
 
 
 def test_saving_is_repeated_until_the_service_answers(visit):
     recording = Recording()
     with FakeService(recording) as first:
-        page = visit(first.url)
-        ready(page)
+        page = opened(visit, first)
     drag(page, "thumb", 8, 12)
-    shows(page, "#save-text", "NOT SAVED: the service does not answer")
-    with FakeService(recording, port=first.port):
+    shows(page, "#save-text", "NOT SAVED")
+    with FakeService(recording, port=first.port) as again:
         saved(page)
         assert page.locator("#alert").is_hidden()
         assert len(recording.file["labels"]["thumb"]) == 1
+        page.evaluate("for (const k of [1, 3, 5]) holdfast.editor.draw(['thumb'], k, k + 1, true)")
+        saved(page)  # quick changes together
+        page.keyboard.press("Control+z")
+        page.keyboard.press("Control+Shift+z")  # before it is saved
+        page.wait_for_timeout(600)
+        assert [len(save["labels"]["thumb"]) for save in again.saves] == [1, 4]
 
 
-def test_a_refused_save_is_shown_and_not_repeated(visit, service):
-    service.refusal = (422, "thumb: <b>no</b>")
-    page = visit(service.url)
-    ready(page)
-    drag(page, "thumb", 8, 12)
-    shows(page, "#save-text", "^NOT SAVED: thumb: <b>no</b>$")
-    page.wait_for_timeout(1500)
-    assert len(service.saves) == 1
-    service.refusal = None
-    drag(page, "thumb", 14, 16)
-    saved(page)
-    assert page.locator("#alert").is_hidden()
-
-
-def test_quick_changes_are_saved_together(visit, service):
-    page = visit(service.url)
-    ready(page)
-    page.evaluate("""() => { for (let k = 0; k < 20; k += 1) {
-      holdfast.editor.draw(["thumb"], k + 0.1, k + 0.6, true);
-    } }""")
-    saved(page)
-    assert len(service.saves) == 1
-    assert len(service.saves[0]["labels"]["thumb"]) == 20
-    page.evaluate("holdfast.editor.draw(['thumb'], 25, 26, true)")
-    page.keyboard.press("Control+z")  # before it is saved
-    shows(page, "#save-text", "^saved")
-    page.wait_for_timeout(600)
-    assert len(service.saves) == 1
-
-
-def test_unsaved_labels_are_offered_when_the_recording_is_opened_again(visit):
+def test_a_refused_save_is_shown_and_not_repeated(visit):
     with FakeService(Recording("one"), Recording("two")) as service:
-        page = visit(service.url)
-        ready(page)
-        service.refusal = (500, "the disk is full")
+        service.refusal = (422, "thumb: <b>no</b>")
+        page = opened(visit, service)
         drag(page, "thumb", 8, 12)
+        shows(page, "#save-text", "thumb: <b>no</b>$")
+        page.wait_for_timeout(1500)
+        assert len(service.saves) == 1
         page.keyboard.press("n")
         shows(page, "#name", "two")
-        shows(page, ".toast.bad", "one is not saved")
         service.refusal = None
-        page.keyboard.press("p")
-        shows(page, "#question", "1 label of one")
+        page.keyboard.press("p")  # it is offered when the recording is opened again
         page.click("#question button[data-value=restore]")
         saved(page)
-        assert rounded(labels(page)) == [OWN]
+        assert labels(page) == [OWN]

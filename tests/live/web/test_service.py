@@ -1,5 +1,4 @@
 import asyncio
-import time
 from contextlib import AsyncExitStack, asynccontextmanager
 
 import msgspec
@@ -54,10 +53,7 @@ async def served(
 
 
 async def wait_for(condition):
-    end = time.monotonic() + PATIENCE
-    while not condition():
-        if time.monotonic() > end:
-            pytest.fail("the condition never became true")
+    while not condition():  # `run` limits the time
         await asyncio.sleep(0.01)
 
 
@@ -86,16 +82,25 @@ def replies(*requests, n=10, **options):
     return run(work())
 
 
-def test_the_first_document_describes_model_and_source(tmp_path):
-    async def work():
-        async with served(patient(10), folder=tmp_path) as (client, _):
-            async with client.ws_connect("/api/v1/live") as socket:
-                hello = await socket.receive_json()
-            async with client.get("/api/v1/info") as answer:
-                assert await answer.json() == hello
-            return hello
+def talk(source, conversation, **options):
+    """The result of a conversation: a function of client, session, socket and first document."""
 
-    hello = run(work())
+    async def work():
+        async with (
+            served(source, **options) as (client, session),
+            client.ws_connect("/api/v1/live") as socket,
+        ):
+            return await conversation(client, session, socket, await socket.receive_json())
+
+    return run(work())
+
+
+def test_the_first_document_describes_model_and_source(tmp_path):
+    async def conversation(client, session, socket, hello):
+        assert await reply(client, "GET", "info") == (200, hello)
+        return hello
+
+    hello = talk(patient(10), conversation, folder=tmp_path)
     assert (hello["schema"], hello["type"]) == ("holdfast.live/1", "hello")
     assert hello["model"] == "builtin:twin"
     assert hello["modules"] == dict.fromkeys(build.FINGERS, 30)
@@ -124,53 +129,39 @@ def with_slip_rule(finger):
 def documents_of(recording, model):
     """Return the first document of a connection, and all live documents of a recording."""
 
-    async def work():
-        source = build.Script.of(recording)
-        async with served(source, start=False, model=model) as (client, session):
-            async with client.ws_connect("/api/v1/live") as socket:
-                hello = await socket.receive_json()
-                session.start()
-                found = []
-                while not found or not found[-1]["ended"]:
-                    found.append(await socket.receive_json())
-                found.append(await socket.receive_json())
-            session.stop()
-            return hello, found
+    async def conversation(client, session, socket, hello):
+        session.start()
+        found = []
+        while not found or not found[-1]["ended"]:
+            found.append(await socket.receive_json())
+        found.append(await socket.receive_json())
+        session.stop()
+        return hello, found
 
-    return run(work())
+    return talk(build.Script.of(recording), conversation, start=False, model=model)
 
 
 def test_slips_are_in_the_documents():
     """Each when it begins and when it ends, with the distance that the estimates have."""
     recording, model = build.grasp(), with_slip_rule("thumb")
-    _, found = documents_of(recording, model)
-    trace = detect(model, recording).fingers["thumb"]
-    slips = [slip for one in found for slip in one["slips"]]
-    slides = trace.slip_distance > 0
-    assert slides.any()
-    expected = [
-        {"finger": "thumb", "begin": trace.times[start], "end": time, "distance": distance}
-        for start, end in runs(slides)
-        for time, distance in (
-            (None, trace.slip_distance[start]), (trace.times[end], trace.slip_distance[end - 1])
-        )
-    ]  # fmt: skip
-    assert [{key: slip[key] for key in expected[0]} for slip in slips] == expected
-    got = [x for one in found for x in one["series"]["fingers"]["thumb"]["slip_speed"]]
-    np.testing.assert_array_equal(np.array(got, dtype=float), trace.slip_speed)
-
-
-def test_probabilities_and_threshold_of_slips_are_in_the_documents():
-    recording, model = build.grasp(), with_slip_rule("thumb")
     hello, found = documents_of(recording, model)
     thresholds = {name: finger["slip_threshold"] for name, finger in hello["fingers"].items()}
     assert thresholds == {"thumb": 0.7, "index": None, "middle": None}
     trace = detect(model, recording).fingers["thumb"]
+    slips = [slip for one in found for slip in one["slips"]]
+    slides = trace.slip_distance > 0
+    assert slides.any()
+    expected = []
+    for start, end in runs(slides):
+        slip = {"finger": "thumb", "begin": trace.times[start]}
+        begins = slip | {"end": None, "distance": trace.slip_distance[start]}
+        ends = slip | {"end": trace.times[end], "distance": trace.slip_distance[end - 1]}
+        expected += [begins, ends]
+    assert [{key: slip[key] for key in expected[0]} for slip in slips] == expected
     series = [one["series"]["fingers"] for one in found]
-    got = [x for one in series for x in one["thumb"]["slip_probability"]]
-    np.testing.assert_array_equal(np.array(got, dtype=float), trace.slip_probability)
-    assert (trace.slip_probability > 0.7).any()
     for field in ("slip_probability", "slip_speed"):
+        got = [x for one in series for x in one["thumb"][field]]
+        np.testing.assert_array_equal(np.array(got, dtype=float), getattr(trace, field))
         assert {x for one in series for x in one["index"][field]} == {None}
     fingers = [one["fingers"] for one in found if one["fingers"]]
     assert {finger["index"]["slip_probability"] for finger in fingers} == {None}
@@ -180,10 +171,8 @@ def test_the_errors_of_a_tuned_model_are_in_the_first_document():
     points = (ThresholdPoint(0.5, 2.0, 10.0), ThresholdPoint(0.9, 0.5, None))
     choice = Choice(1.0, 0.5, None, 0, 1.0, points=points)
     tuned = build.model().changed(lambda part: part.with_heads(part.stable.at(0.9, choice)))
-    found = operating_points(tuned)
-    assert [(one.threshold, one.false_alarms_per_minute, one.missed) for one in found] == [
-        (0.5, 2.0, 10.0), (0.9, 0.5, None),
-    ]  # fmt: skip
+    found = [msgspec.structs.astuple(one) for one in operating_points(tuned)]
+    assert found == [(0.5, 2.0, 10.0), (0.9, 0.5, None)]
     assert operating_points(build.model()) == []
 
 
@@ -210,30 +199,6 @@ def test_documents_have_every_sample_once_and_the_newest_values():
     assert np.shape(last["fingers"]["index"]["taxels"]) == (30, 3)
 
 
-def test_every_estimate_is_sent():
-    recording = build.grasp()
-    n = 600
-
-    async def work():
-        source = patient(n, recording)
-        async with (
-            served(source, start=False) as (client, session),
-            client.ws_connect("/api/v1/estimates") as socket,
-        ):
-            await socket.receive_json()
-            session.start()
-            found = [await socket.receive_json() for _ in range(n)]
-            session.stop()
-            return found
-
-    expected = detect(build.model(), recording)
-    for k, one in enumerate(run(work())):
-        msgspec.convert(one, schema.EstimateDocument, strict=False)
-        assert one["time"] == expected.times[k]
-        assert one["hand"] == ("UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE")[expected.hand[k]]
-        assert set(one["fingers"]) == set(build.FINGERS)
-
-
 def test_clients_that_do_not_read_delay_no_other():
     recording = build.grasp()
     n = 900  # fewer than a queue has, so that the last client gets all
@@ -246,12 +211,15 @@ def test_clients_that_do_not_read_delay_no_other():
             good = await stack.enter_async_context(client.ws_connect("/api/v1/estimates"))
             await good.receive_json()
             session.start()
-            times = [(await good.receive_json())["time"] for _ in range(n)]
+            found = [await good.receive_json() for _ in range(n)]
             session.stop()
-            return times, session.latency()
+            return found, session.latency()
 
-    times, latency = run(work())
-    assert times == recording.modules["thumb"].times[:n].tolist()
+    found, latency = run(work())
+    assert [one["time"] for one in found] == recording.modules["thumb"].times[:n].tolist()
+    states = [msgspec.convert(one, schema.EstimateDocument, strict=False).hand for one in found]
+    assert [state.code for state in states] == detect(build.model(), recording).hand[:n].tolist()
+    assert set(found[-1]["fingers"]) == set(build.FINGERS)
     assert latency.p50 < 1.0  # an estimate does not wait for a socket
 
 
@@ -262,50 +230,35 @@ def test_the_queue_of_a_client_keeps_the_newest_documents():
     assert [client._queue.get_nowait() for _ in range(client._queue.qsize())] == ["7", "8", "9"]
 
 
-def test_the_tare(tmp_path):
-    async def work():
-        recording = build.grasp()
-        arrivals = build.arrivals_of(recording)
-        source = build.Lasting.of(recording, arrivals[:200], patient=True)
-        async with served(source) as (client, session):
-            await wait_for(lambda: session.n_packets >= 200)
-            first = await reply(client, "POST", "tare")
-            source.steps.extend(arrivals[200:600])
-            await wait_for(lambda: source.last.time >= arrivals[599].time)
-            return first, await reply(client, "POST", "tare")
+def test_the_tare_is_refused_in_contact():
+    async def conversation(client, session, socket, hello):
+        early = await reply(client, "POST", "tare")
+        await wait_for(lambda: session.n_packets >= 600)
+        return early, (await reply(client, "POST", "tare"))[0]
 
-    free, touching = run(work())
-    assert free == (200, {})
-    assert touching[0] == 409
-    assert touching[1]["error"].startswith("thumb, index, middle in contact")
+    recording = build.grasp()
+    source = build.Lasting.of(recording, build.arrivals_of(recording)[:600], patient=True)
+    assert talk(source, conversation) == ((200, {}), 409)
 
 
 def test_a_recording_with_a_marker(tmp_path):
     recording = build.grasp()
     begin = {"method": "POST", "path": "recording", "json": {"name": "mine"}}
     mark = {"method": "POST", "path": "markers", "json": {"text": "closing"}}
+    end = {"method": "DELETE", "path": "recording"}
+    source = patient(100, recording)
 
-    async def work():
-        source = patient(100, recording)
-        async with served(source, folder=tmp_path) as (client, session):
-            await wait_for(lambda: session.n_packets == 100)
-            early = [await reply(client, **mark), await reply(client, "DELETE", "recording")]
-            assert [status for status, _ in early] == [409, 409]
-            assert await reply(client, **begin) == (200, {"path": str(tmp_path / "mine.mcap")})
-            second = await reply(client, **begin)
-            source.steps.extend(build.arrivals_of(recording)[100:300])
-            await wait_for(lambda: session.n_packets == 300)
-            assert (await reply(client, **mark))[0] == 200
-            _, ended = await reply(client, "DELETE", "recording")
-            return second, ended, await reply(client, **begin)
+    async def conversation(client, session, socket, hello):
+        await wait_for(lambda: session.n_packets == 100)
+        found = [await reply(client, **one) for one in (mark, end, begin, begin)]
+        source.steps.extend(build.arrivals_of(recording)[100:300])
+        await wait_for(lambda: session.n_packets == 300)
+        return found + [await reply(client, **one) for one in (mark, end, begin)]
 
-    second, ended, again = run(work())
-    for (status, answer), text in (
-        (second, "mine.mcap is being recorded already"), (again, "exists already")
-    ):  # fmt: skip
-        assert status == 409
-        assert text in answer["error"]
-    assert ended["path"] == str(tmp_path / "mine.mcap")
+    found = talk(source, conversation, folder=tmp_path)
+    assert [status for status, _ in found] == [409, 409, 200, 409, 200, 200, 409]
+    assert found[2][1]["path"] == found[5][1]["path"] == str(tmp_path / "mine.mcap")
+    assert all("mine.mcap" in found[k][1]["error"] for k in (3, 6))
     found = load_recording(tmp_path / "mine.mcap")
     assert found.complete
     assert [text for _, text in found.markers] == ["closing"]
@@ -319,120 +272,96 @@ def test_recordings_that_cannot_be_made(tmp_path):
     inside = tmp_path / "file" / "folder"
     begin, end = ("POST", "recording", {"name": "mine"}), ("DELETE", "recording")
     for folder, requests, text in (
-        (None, [begin], "no folder for recordings: start with --record-to FOLDER"),
-        (inside, [begin], f"cannot write to {inside}: Not a directory"),
-        (tmp_path, [begin, end], f"no samples arrived: {tmp_path / 'mine.mcap'} is removed"),
+        (None, [begin], "--record-to FOLDER"),
+        (inside, [begin], str(inside)),
+        (tmp_path, [begin, end], str(tmp_path / "mine.mcap")),
     ):
-        assert replies(*requests, n=0, folder=folder)[-1] == (409, {"error": text})
+        status, answer = replies(*requests, n=0, folder=folder)[-1]
+        assert status == 409
+        assert text in answer["error"]
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
     ((status, _),) = replies(("POST", "recording", {"name": ""}), folder=tmp_path)
     assert status == 200  # its name is the date and time
 
 
 def test_a_recording_that_cannot_be_written_ends_with_a_notice(tmp_path):
-    async def work():
-        async with served(patient(100), folder=tmp_path) as (client, session):
-            await wait_for(lambda: session.n_packets == 100)
-            async with client.ws_connect("/api/v1/live") as socket:
-                await socket.receive_json()
-                async with client.post("/api/v1/recording", json={"name": "mine"}):
-                    (tmp_path / "mine.mcap").unlink()
-                notices = []
-                while not notices:
-                    document = await socket.receive_json()
-                    notices = [one["text"] for one in document["notices"]]
-                while document["recording"] is not None:
-                    document = await socket.receive_json()
-            return notices
+    async def conversation(client, session, socket, hello):
+        await wait_for(lambda: session.n_packets == 100)
+        assert (await reply(client, "POST", "recording", json={"name": "mine"}))[0] == 200
+        (tmp_path / "mine.mcap").unlink()
+        document = await next_with_notice(socket)
+        (notice,) = document["notices"]
+        while document["recording"] is not None:
+            document = await socket.receive_json()
+        return notice["text"]
 
-    (notice,) = run(work())
-    assert notice.startswith("the recording has ended: cannot write ")
-    assert notice.endswith("it was removed while it was recorded")
+    notice = talk(patient(100), conversation, folder=tmp_path)
+    assert str(tmp_path / "mine.mcap") in notice
+
+
+async def next_with_notice(socket):
+    while not (document := await socket.receive_json())["notices"]:
+        pass
+    return document
 
 
 def test_the_threshold_is_changed_and_noticed():
-    async def work():
-        recording = build.grasp()
-        source = build.Lasting.of(recording, build.arrivals_of(recording)[:100], patient=True)
-        async with (
-            served(source, reports=reports) as (client, _),
-            client.ws_connect("/api/v1/live") as socket,
-        ):
-            hello = await socket.receive_json()
-            async with client.post("/api/v1/threshold", json={"value": 0.75}) as answer:
-                assert (answer.status, await answer.json()) == (200, {})
-            changed = await next_with_notice(socket)
-            async with client.delete("/api/v1/threshold") as answer:
-                assert answer.status == 200
-            return hello, changed, await next_with_notice(socket)
+    async def conversation(client, session, socket, hello):
+        assert await reply(client, "POST", "threshold", json={"value": 0.75}) == (200, {})
+        changed = await next_with_notice(socket)
+        assert (await reply(client, "DELETE", "threshold"))[0] == 200
+        return hello, changed, await next_with_notice(socket)
 
-    async def next_with_notice(socket):
-        while not (document := await socket.receive_json())["notices"]:
-            pass
-        return document
-
-    reports = []
-    hello, changed, restored = run(work())
+    reports, recording = [], build.grasp()
+    source = build.Lasting.of(recording, build.arrivals_of(recording)[:100], patient=True)
+    hello, changed, restored = talk(source, conversation, reports=reports)
     own = hello["fingers"]["thumb"]["probability_threshold"]
     assert changed["thresholds"] == dict.fromkeys(build.FINGERS, 0.75)
     assert restored["thresholds"] == dict.fromkeys(build.FINGERS, own)
     texts = [document["notices"][0]["text"] for document in (changed, restored)]
-    assert texts == reports == ["threshold set to 0.75", "threshold of the model restored"]
+    assert texts == reports
+    assert "0.75" in texts[0]
 
 
 REFUSED = {
-    ("recording", 409, "a name of letters"): [
-        b'{"name": "../up"}', b'{"name": "a/b"}', b'{"name": ".hidden"}',
-        b'{"name": "' + b"x" * 200 + b'"}',
-    ],
-    ("recording", 400, "/api/v1/recording: "): [
-        b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}',
-    ],
-    ("threshold", 400, "/api/v1/threshold: "): [
-        b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}',
-    ],
-}  # fmt: skip
+    ("recording", 409): ["../up", "a/b", ".hidden", "x" * 200],
+    ("recording", 400): [b"{", b"[" * 50_000, b"[]", b'{"name": 3}', b'{"nam": "a"}'],
+    ("threshold", 400): [b"{}", b'{"value": 1.5}', b'{"value": null}', b'{"value": "a"}'],
+}
 
 
 def test_invalid_requests_are_refused_and_change_nothing(tmp_path):
-    async def work():
-        async with served(patient(10), folder=tmp_path) as (client, session):
-            for (path, status, text), bodies in REFUSED.items():
-                for body in bodies:
-                    found, answer = await reply(client, "POST", path, data=body)
-                    assert (found, text in answer["error"]) == (status, True), body[:50]
-            return set(session.stream.thresholds.values())
+    async def conversation(client, session, socket, hello):
+        for (path, status), bodies in REFUSED.items():
+            for body in bodies:
+                data = body if status == 400 else msgspec.json.encode({"name": body})
+                found, answer = await reply(client, "POST", path, data=data)
+                assert (found, list(answer)) == (status, ["error"]), body[:50]
+        return set(session.stream.thresholds.values())
 
-    assert run(work()) == {build.model().finger("thumb").stable.threshold}
+    own = {build.model().finger("thumb").stable.threshold}
+    assert talk(patient(10), conversation, folder=tmp_path) == own
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_fault_that_lasts_is_a_problem_and_a_notice():
-    async def work():
-        recording = build.grasp()
-        steps = build.arrivals_of(recording)[:400]
-        for k in range(150, 400):
-            steps[k] = steps[k]._replace(faults={"thumb": (Fault.LATE,)})
-        source = build.Script.of(recording, steps, patient=True)
-        async with (
-            served(source, start=False) as (client, session),
-            client.ws_connect("/api/v1/live") as socket,
-        ):
-            hello = await socket.receive_json()
-            session.start()
-            document = {"problems": []}
-            notices = []
-            while not document["problems"]:
-                document = await socket.receive_json()
-                notices += document["notices"]
-            session.stop()
-            return hello, document, notices
+    async def conversation(client, session, socket, hello):
+        session.start()
+        document, notices = {"problems": []}, []
+        while not document["problems"]:
+            document = await socket.receive_json()
+            notices += document["notices"]
+        session.stop()
+        return hello, document, notices
 
-    hello, document, notices = run(work())
-    text = f"thumb: {hello['faults']['late']['advice']}"
-    problem = {"fault": "late", "fingers": ["thumb"], "text": f"{text} (0 ms)"}
-    assert document["problems"] == [problem]
-    assert [notice["text"] for notice in notices] == [text]
+    recording = build.grasp()
+    late = [x._replace(faults={"thumb": (Fault.LATE,)}) for x in build.arrivals_of(recording)]
+    source = build.Script.of(recording, late[:400], patient=True)
+    hello, document, notices = talk(source, conversation, start=False)
+    (problem,) = document["problems"]
+    assert (problem["fault"], problem["fingers"]) == ("late", ["thumb"])
+    assert hello["faults"]["late"]["advice"] in problem["text"]
+    assert [notice["text"] in problem["text"] for notice in notices] == [True]
     assert set(hello["faults"]) == set(map(str, Fault))
     assert hello["debounce"] == {"min_duration": 0.0, "hysteresis": 0.1, "hold": 0.1}
 
@@ -444,110 +373,66 @@ def test_faulty_taxels_are_numbers_from_1():
     assert document["faulty_taxels"] == (4, 8)
 
 
-HEADERS = [
-    ({}, 200),
-    ({"Host": "localhost:1"}, 200),
-    ({"Host": "evil.example"}, 403),
-    ({"Origin": "http://evil.example"}, 403),
-    ({"Origin": "null"}, 403),
-]
+def test_the_service_is_guarded():
+    """By what `tests/web/test_guard.py` tests: hosts, origins and the token."""
 
-
-def test_other_origins_and_host_names_are_refused():
-    async def work():
-        recording = build.grasp()
-        source = build.Lasting.of(recording, build.arrivals_of(recording)[:10], patient=True)
-        async with served(source) as (client, _):
-            for headers, status in HEADERS:
-                async with client.post("/api/v1/tare", headers=headers) as answer:
-                    assert answer.status == status
-                try:
-                    async with client.ws_connect("/api/v1/live", headers=headers):
-                        assert status == 200
-                except WSServerHandshakeError as refusal:
-                    assert refusal.status == status
-
-    run(work())
-
-
-def test_the_token_is_needed_and_accepted_in_both_forms():
     async def work():
         found = []
         async with served(patient(10), token="long-secret") as (client, _):
             for words in (
                 {},
-                {"headers": {"Authorization": "Bearer wrong"}},
                 {"headers": {"Authorization": "Bearer long-secret"}},
                 {"params": {"token": "long-secret"}},
-                {"params": {"token": "sécret"}},
+                {"params": {"token": "long-secret"}, "headers": {"Host": "evil.example"}},
+                {"params": {"token": "long-secret"}, "headers": {"Origin": "null"}},
             ):
                 async with client.get("/api/v1/info", **words) as answer:
                     found.append(answer.status)
+            with pytest.raises(WSServerHandshakeError):
+                await client.ws_connect("/api/v1/live")
             async with client.ws_connect("/api/v1/live?token=long-secret") as socket:
                 assert (await socket.receive_json())["type"] == "hello"
             async with client.get("/") as answer:
                 assert answer.status == 200  # the page itself holds no secret
         return found
 
-    assert run(work()) == [401, 401, 200, 200, 401]
+    assert run(work()) == [401, 200, 200, 403, 403]
 
 
-def test_too_many_websockets_are_refused(monkeypatch):
-    monkeypatch.setattr("holdfast.live.web.service.MAX_WEBSOCKETS", 2)
+@pytest.mark.parametrize(("limit", "n"), [("MAX_WEBSOCKETS", 2), ("MAX_WEBSOCKETS_PER_ADDRESS", 1)])
+def test_too_many_websockets_are_refused(monkeypatch, limit, n):
+    monkeypatch.setattr(f"holdfast.live.web.service.{limit}", n)
 
     async def work():
-        async with served(patient(10)) as (client, _):
-            async with client.ws_connect("/api/v1/live"), client.ws_connect("/api/v1/estimates"):
-                async with client.get("/api/v1/live") as answer:
-                    full = answer.status, (await answer.json())["error"]
-                async with client.get("/api/v1/info") as answer:
-                    assert answer.status == 200
+        async with served(patient(10)) as (client, _), AsyncExitStack() as stack:
+            for _ in range(n):
+                await stack.enter_async_context(client.ws_connect("/api/v1/live"))
+            async with client.get("/api/v1/live") as answer:
+                assert answer.status == 503
+                assert (await answer.json())["error"].startswith(f"{n} WebSockets ")
+            async with client.get("/api/v1/info") as answer:
+                assert answer.status == 200
+            await stack.aclose()
             async with client.ws_connect("/api/v1/live") as socket:
                 assert (await socket.receive_json())["type"] == "hello"
-            return full
 
-    assert run(work()) == (503, "2 WebSockets are open; close one of them")
-
-
-def test_one_address_leaves_room_for_others(monkeypatch):
-    monkeypatch.setattr("holdfast.live.web.service.MAX_WEBSOCKETS_PER_ADDRESS", 1)
-
-    async def work():
-        async with (
-            served(patient(10)) as (client, _),
-            client.ws_connect("/api/v1/live"),
-            client.get("/api/v1/estimates") as answer,
-        ):
-            return answer.status, (await answer.json())["error"]
-
-    assert run(work()) == (503, "1 WebSockets of 127.0.0.1 are open; close one of them")
+    run(work())
 
 
 def test_the_page_loads_nothing_from_other_servers():
-    async def work():
-        found = []
-        async with served(patient(10)) as (client, _):
-            for path in ("/", "/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"):
-                async with client.get(path) as answer:
-                    found.append((answer.status, dict(answer.headers), await answer.text()))
-        return found
+    async def conversation(client, session, socket, hello):
+        for path in ("/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"):
+            async with client.get(path) as answer:
+                assert answer.status == 200
+        async with client.get("/") as answer:
+            return dict(answer.headers), await answer.text()
 
-    files = run(work())
-    assert all(status == 200 and len(text) > 100 for status, _, text in files)
-    _, headers, text = files[0]
+    headers, text = talk(patient(10), conversation)
     assert "default-src 'self'" in headers["Content-Security-Policy"]
-    assert headers["X-Content-Type-Options"] == "nosniff"
-    assert "holdfast" in text
     assert "https://" not in text
 
 
 def test_the_schema_is_that_of_the_documents():
     ((_, document),) = replies(("GET", "schema"))
     assert {"HelloDocument", "LiveDocument", "EstimateDocument"} <= set(document["$defs"])
-    for field in ("slip_probability", "slip_speed"):
-        assert field in document["$defs"]["EstimateSeries"]["required"]
-        assert field in document["$defs"]["FingerDocument"]["required"]
-    assert "slip_distance" in document["$defs"]["FingerDocument"]["required"]
     assert {"begin", "end", "distance"} < set(document["$defs"]["SlipDocument"]["required"])
-    threshold = document["$defs"]["FingerInfo"]["properties"]["slip_threshold"]
-    assert {"type": "null"} in threshold["anyOf"]

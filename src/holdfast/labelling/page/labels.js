@@ -14,15 +14,11 @@ const sorted = (labels) => labels.sort((a, b) => a.start - b.start);
 const sameKind = (a, b) => a.state === b.state && (a.cause ?? null) === (b.cause ?? null);
 const middle = (item) => (item.start + item.end) / 2;
 
-/** Return whether labels are sorted, do not overlap, and begin before they end. */
-export const areValid = (labels) => labels.every((label, k) => label.start < label.end
-  && (k === 0 || labels[k - 1].end <= label.start));
-
 /** Return the label that contains a time, or undefined. */
 export const labelAt = (labels, time) => labels.find((label) => label.start <= time && time < label.end);
 
 /** Remove [start, end) from labels; drop remainders shorter than `minDuration` [s]. */
-export function cut(labels, start, end, minDuration = 0) {
+function cut(labels, start, end, minDuration = 0) {
   const remaining = [];
   for (const label of labels) {
     if (label.end <= start || label.start >= end) {

@@ -67,7 +67,6 @@ export class Plot {
     this.snapTime = null; // time that the dragged edge snaps to [s]
     this.target = () => null; // the item that Enter accepts
     this.rows = [];
-    this.hasNewSignals = false;
     new ResizeObserver(() => this.resize()).observe(byId("rows"));
   }
 
@@ -98,7 +97,6 @@ export class Plot {
 
   /** Draw signals that have arrived. */
   updateSignals() {
-    this.hasNewSignals = true;
     this.scales = this.scaleToWindow ? this.scales : null;
     this.redraw("overview", "signals", "cursor");
   }
@@ -118,10 +116,8 @@ export class Plot {
       this.drawLayer(layer, prepareCanvas(this.canvases[layer], this.view.width, height));
     }
     if (!layers.has("signals") || !this.signals.coarse) return;
-    // Tests and benchmarks wait for these attributes.
+    // Tests wait for this attribute.
     document.body.dataset.painted = "1";
-    if (this.hasNewSignals) document.body.dataset.drawn = String(Number(document.body.dataset.drawn ?? 0) + 1);
-    this.hasNewSignals = false;
   }
 
   drawLayer(layer, context) {

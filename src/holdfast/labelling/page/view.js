@@ -26,7 +26,6 @@ export class View {
   get span() { return this.end - this.start; }
   get plotWidth() { return Math.max(1, this.width - LEFT_MARGIN - RIGHT_MARGIN); }
   get secondsPerPixel() { return this.span / this.plotWidth; }
-  get showsAll() { return this.start <= this.low && this.end >= this.high; }
 
   x(time) { return LEFT_MARGIN + (time - this.start) / this.secondsPerPixel; }
   time(x) { return this.start + (x - LEFT_MARGIN) * this.secondsPerPixel; }

@@ -30,5 +30,5 @@ export async function callService(method, path, body) {
   const reason = answer?.error ?? (response.status === 401
     ? "the service needs its token: add ?token=… to the address"
     : `the service answered ${response.status}`);
-  throw Object.assign(new Error(reason), { status: response.status, revision: answer?.revision });
+  throw Object.assign(new Error(reason), { status: response.status });
 }

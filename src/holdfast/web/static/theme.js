@@ -1,11 +1,11 @@
 // Colours for canvases, read from the style sheet, which defines them.
 
 const NAMES = [
-  "ground", "panel", "raised", "edge", "text", "muted", "grid", "base", "outline", "ink", "focus",
+  "ground", "panel", "text", "muted", "grid", "base", "outline", "ink", "focus",
   "stable", "unstable", "no-contact", "unknown",
   "stable-line", "unstable-line", "no-contact-line", "unknown-line",
   "finger-0", "finger-1", "finger-2", "finger-3", "finger-4", "finger-5",
-  "axis-x", "axis-y", "axis-z", "marker", "slip", "slip-line",
+  "axis-x", "axis-y", "axis-z", "marker", "slip",
 ];
 export const lightTheme = window.matchMedia("(prefers-color-scheme: light)");
 

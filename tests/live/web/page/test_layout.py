@@ -7,17 +7,15 @@ from holdfast.sensors import sensor
 
 LAYOUT = "async (given) => (await import('/page/layout.js')).layout(...given)"
 TURNED = "async (given) => (await import('/page/layout.js')).toMapFrame(...given)"
-HULL = "async (given) => (await import('/page/layout.js')).hull(given)"
 
 
 def laid_out(page, layout):
-    found = page.evaluate(
-        LAYOUT, [layout.positions.tolist(), layout.rotations.tolist(), layout.normal.tolist()]
-    )
+    parts = (layout.positions, layout.rotations, layout.normal)
+    found = page.evaluate(LAYOUT, [part.tolist() for part in parts])
     return {name: np.array(value) for name, value in found.items()}
 
 
-@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-4x6", "papillarray", "anyskin", "gtac"])
+@pytest.mark.parametrize("name", ["uskin-4x4", "gtac"])
 def test_a_flat_patch_does_not_change(module, name):
     layout = sensor(name)
     found = laid_out(module, layout)
@@ -31,36 +29,13 @@ def test_the_curved_fingertip_shows_all_its_taxels(module):
     found = laid_out(module, layout)
     places = found["places"]
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-    straight = np.linalg.norm(layout.positions[:, None] - layout.positions[None], axis=2)
-    near = (straight > 0) & (straight < 9e-3)
     assert apart[~np.eye(30, dtype=bool)].min() > 5e-3
-    assert (apart[near] / straight[near]).min() > 0.9
-    assert (apart[near] / straight[near]).max() < 1.8  # no dome is flattened without stretching
     # Left is the mirror of right: the table lists the right side first, in the same order.
     for left, right in ((16, 10), (17, 11), (21, 15), (22, 6), (25, 9), (26, 1), (30, 5)):
         assert places[left - 1] == pytest.approx(places[right - 1] * [-1, 1], abs=1e-9)
     # The tip is up, and the lateral axis to the right.
     assert places[9, 1] > places[14, 1]
     assert places[0, 0] > 0
-
-
-def test_directions_lie_in_the_skin(module):
-    layout = sensor("uskin-curved")
-    found = laid_out(module, layout)
-    normals = layout.rotations[:, :, 2]
-    right, up = found["right"], found["up"]
-    assert np.cross(right, up) == pytest.approx(normals, abs=1e-6)
-    assert np.linalg.norm(right, axis=1) == pytest.approx(np.ones(30))
-
-
-def test_a_cylinder_is_unrolled_to_its_arc(module):
-    angles, radius = np.linspace(-2, 2, 9), 0.011
-    positions = np.stack([radius * np.cos(angles), radius * np.sin(angles), 0 * angles], axis=1)
-    normals = positions / radius
-    up = np.tile([0, 0, 1.0], (9, 1))
-    rotations = np.stack([np.cross(up, normals), up, normals], axis=2)
-    found = module.evaluate(LAYOUT, [positions.tolist(), rotations.tolist(), [1, 0, 0]])
-    assert np.array(found["places"])[:, 0] == pytest.approx(radius * angles)
 
 
 def test_a_push_to_the_tip_points_up_on_every_taxel_of_the_wall(module):
@@ -74,20 +49,3 @@ def test_a_push_to_the_tip_points_up_on_every_taxel_of_the_wall(module):
             [reading.tolist(), rotation, found["right"][k].tolist(), found["up"][k].tolist()],
         )
         assert arrow == pytest.approx([0, 2, 0], abs=1e-6)
-
-
-def test_taxels_without_places_get_a_grid(module):
-    eye = np.eye(3).tolist()
-    found = module.evaluate(LAYOUT, [[[0, 0, 0]] * 7, [eye] * 7, [0, 0, 1]])
-    assert len({tuple(place) for place in found["places"]}) == 7
-    assert found["spacing"] == pytest.approx(5e-3)
-
-
-def test_one_taxel_has_a_map_too(module):
-    found = module.evaluate(LAYOUT, [[[0.1, 0.2, 0]], [np.eye(3).tolist()], [0, 0, 1]])
-    assert found["places"] == [pytest.approx([0.1, 0.2])]
-
-
-def test_the_hull_goes_around_all_places(module):
-    square = [[0, 0], [1, 1], [0, 1], [0.5, 0.4], [1, 0], [0.5, 0]]
-    assert module.evaluate(HULL, square) == [[0, 0], [1, 0], [1, 1], [0, 1]]

@@ -9,7 +9,7 @@ import { debounceNote, distance, faultWord, hasSlipRule, number, percent, reason
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
 
 /** Return the filled fraction of a logarithmic bar, from 0 to 1. */
-export function logFraction(value, [low, high]) {
+function logFraction(value, [low, high]) {
   if (!(value > 0)) return 0;
   return Math.min(1, Math.max(0, Math.log(value / low) / Math.log(high / low)));
 }

@@ -11,7 +11,7 @@ const plus = (a, b) => a.map((x, k) => x + b[k]);
 const column = (rotation, c) => rotation.map((row) => row[c]);
 
 /** Return right, up and out of the map: seen from outside; the distal axis (z, or y of a flat patch) is up. */
-export function viewOf(normal) {
+function viewOf(normal) {
   const out = unit(normal);
   const axis = Math.abs(out[2]) < 0.9 ? [0, 0, 1] : [0, 1, 0];
   const up = unit(plus(axis, scaled(out, -dot(axis, out))));
@@ -64,7 +64,7 @@ export function layout(positions, rotations, normal) {
 }
 
 /** Return the smallest distance between two places; 1 mm for a single taxel. */
-export function spacing(places) {
+function spacing(places) {
   let least = Infinity;
   places.forEach((a, k) => {
     for (const b of places.slice(k + 1)) {

@@ -2,7 +2,7 @@
 
 import { STATES, UNKNOWN, shownProbability } from "./format.js";
 
-export const SECONDS = 60;
+const SECONDS = 60;
 const COLUMNS = ["fx", "fy", "fz", "force", "sigma", "probability", "slip"];
 
 /** Return the number of samples in a minute at a rate [Hz]; sensors reach up to 1000 Hz. */
@@ -30,11 +30,6 @@ export class SampleStore {
 
   get start() { return Math.max(0, this.end - this.capacity); }
   get latest() { return this.end ? this.times[this.end - 1] : null; }
-
-  /** Size of the arrays [bytes]. */
-  get bytes() {
-    return this.arrays().reduce((sum, array) => sum + array.byteLength, 0);
-  }
 
   arrays() {
     return [this.times, this.hand, ...[...this.fingers.values()].flatMap((columns) => Object.values(columns))];

@@ -6,19 +6,19 @@ import { toast } from "./controls.js";
 import { number, share } from "./format.js";
 
 /** Return the point of the validation that is nearest to a threshold; null if there is none. */
-export function nearestPoint(points, threshold) {
+function nearestPoint(points, threshold) {
   const distance = (point) => Math.abs(point.threshold - threshold);
   return points.reduce((best, point) => (best === null || distance(point) < distance(best) ? point : best), null);
 }
 
 /** Return the probability of log odds; five digits, as `holdfast tune` has them. */
-export const probabilityOf = (logOdds) => Number((1 / (1 + Math.exp(-logOdds))).toPrecision(5));
+const probabilityOf = (logOdds) => Number((1 / (1 + Math.exp(-logOdds))).toPrecision(5));
 
 /** Return the log odds of a probability; at most 8, the end of the slider. */
-export const logOddsOf = (probability) => Math.max(-8, Math.min(8, Math.log(probability / (1 - probability))));
+const logOddsOf = (probability) => Math.max(-8, Math.min(8, Math.log(probability / (1 - probability))));
 
 /** Return what the validation of the model expects at a threshold, as a sentence. */
-export function expectation(points, threshold) {
+function expectation(points, threshold) {
   const point = nearestPoint(points, threshold);
   if (point === null) return "The errors to expect are not known: holdfast tune adds them to the model.";
   const missed = point.missed === null ? "" : `, ${number(point.missed).replace(/\.?0+$/, "")}\u202f% of events missed`;
@@ -26,7 +26,7 @@ export function expectation(points, threshold) {
 }
 
 /** Return thresholds as text: one value, or the range of those of the fingers. */
-export function thresholdWord(values) {
+function thresholdWord(values) {
   const [low, high] = [Math.min(...values), Math.max(...values)];
   return low === high ? share(low) : `${share(low)} to ${share(high)}`;
 }
