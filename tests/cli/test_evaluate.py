@@ -2,10 +2,11 @@ import json
 from dataclasses import replace
 
 import msgspec
+import numpy as np
 import pytest
 
 from command_line import Verb
-from holdfast.io import load_dataset, save_recording
+from holdfast.io import load_dataset, load_recording, save_recording
 from holdfast.model import Model
 from holdfast.training import evaluate
 from holdfast.twin import simulation
@@ -140,3 +141,14 @@ def test_the_model_of_the_twin_fits_a_grasp_of_the_twin(capsys, twin_grasp):
     assert report["trained_on"] == []
     assert report["pooled"]["accuracy"] > 80
     assert report["pooled"]["auc"] > 0.9
+
+
+def test_a_truth_with_impacts_has_a_line_of_its_own(capsys, twin_grasp, tmp_path):
+    grasp = load_recording(twin_grasp)
+    truth, lock = grasp.truth, grasp.metadata["locked_at"]
+    kinds = np.where(np.abs(truth.times - lock - 0.2) < 0.02, "knock", "")
+    hit = replace(grasp, truth=replace(truth, hand={**truth.hand, "impact": kinds}))
+    save_recording(hit, tmp_path / "hit.parquet")
+    assert "Knocks, taps and bumps" in run(capsys, "builtin:twin", tmp_path / "hit.parquet")[1]
+    report = json.loads(run(capsys, "builtin:twin", tmp_path / "hit.parquet", "--json")[1])
+    assert report["slips"]["pooled"]["impacts"] == {"n": 4, "false_alarms_per_impact": 0.0}

@@ -164,6 +164,7 @@ MESSAGES = [
     ("export builtin:any model.c --sensor gtac --fingers 1", ".h"),
     ("export builtin:twin model.h --format csv", "--format", "builtin:twin is a model"),
     ("export data out", "--format", "csv"),
+    ("export data kept --format csv", "kept", "a folder"),
     ("export data out --format csv --fingers 2", "--fingers", "data is a recording or a folder"),
     ("export data data --format csv", "data/a.csv exists already", "--force"),
     ("sensors uskin", "'uskin'", "uskin-4x4", "allegro-uskin", ".json"),

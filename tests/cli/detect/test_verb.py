@@ -343,6 +343,9 @@ def test_a_live_source_ends_after_its_seconds_or_by_a_signal(capsys, monkeypatch
         if number is None:
             got, _ = lines(capsys, NOISE_FLOOR, server.uri, "--seconds", "1")
             assert list(got[0]) == FIELDS
+            monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+            _, out, _ = VERB.run(capsys, NOISE_FLOOR, server.uri, "--seconds", "4")
+            assert {row.split()[2].rstrip(",") for row in out.splitlines()[1:]} >= {"thumb"}
         else:
             assert set(summary(capsys, NOISE_FLOOR, server.uri)["fingers"]) == {"thumb", "index"}
 

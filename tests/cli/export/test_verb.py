@@ -39,3 +39,4 @@ def test_tables_say_what_they_leave_out_and_are_overwritten_by_force(capsys, gra
     assert (code, printed.split(":")[0]) == (0, str(out))
     assert err == "a CSV table has no metadata\n"
     assert (out / "grasp-2.csv").read_text().startswith("# sensor")
+    assert VERB.document(capsys, grasp, out, "--format", "csv", "--force")["format"] == "csv"

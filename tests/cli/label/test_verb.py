@@ -17,7 +17,7 @@ from holdfast.contact import ContactState
 from holdfast.io import labels_path, load_recording, save_recording
 from holdfast.recordings import Label
 
-from .helpers import refusal, run_json, save_manual_labels
+from .helpers import VERB, refusal, run_json, save_manual_labels
 
 
 def test_labels_go_to_csv_and_back(capsys, folder):
@@ -77,6 +77,7 @@ def test_a_sheet_of_markers(capsys, tmp_path):
     sheet = tmp_path / "sheet.pdf"
     assert run_json(capsys, "markers", sheet) == {"sheet": str(sheet)}
     assert sheet.read_bytes().startswith(b"%PDF-1.4")
+    assert str(sheet) in VERB.run(capsys, "markers", sheet, "--force")[1]
 
 
 TIMEOUT = 60.0

@@ -14,9 +14,8 @@ from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import GraspResult
 from holdfast.live.teaching.steps import STEPS
 from holdfast.model import Model
-from holdfast.synthetic import synthetic_recording
 from holdfast.twin import webcam
-from training.build import sliding_recording
+from training.build import handling_recording, normalised_model, sliding_recording
 
 pytestmark = pytest.mark.slow
 
@@ -64,6 +63,8 @@ def test_no_hand_at_the_source_is_one_line(capsys, tmp_path, monkeypatch):
     assert code == 2
     assert "127.0.0.1:1" in err.splitlines()[-1]
     assert "--camera" in err
+    code, _, err = run(capsys, "teach", "xela:", "-o", "new.json", "--camera", "none.mp4")
+    assert (code, "none.mp4" in err) == (2, True)
     # Nothing is in the way of the next attempt.
     with pipe_of(monkeypatch, "quit\n"):
         code, _, err = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json")
@@ -136,16 +137,23 @@ def test_without_a_measured_slip_there_is_a_calibration_or_nothing(
     assert run(capsys, "teach", "twin:", "-o", out, "--force")[0] == 0
 
 
-@pytest.mark.parametrize("name", ["carry", "hold"])
-def test_what_was_carried_calibrates(tmp_path, capsys, name):
-    """The arm of a synthetic hand hardly moves: the model stays as it is, and says why."""
+@pytest.mark.parametrize(
+    ("name", "options", "why"),
+    [
+        ("carry", {}, ""),
+        ("carry", {"sway": 0.0}, "pad: the arm hardly moved"),
+        ("hold", {}, "nothing"),
+    ],
+)
+def test_what_was_carried_calibrates(tmp_path, capsys, name, options, why):
     folder = TeachingFolder(tmp_path / "grasps", resume=False)
-    save_recording(synthetic_recording("hand", 1), folder.path / "001-carry.mcap")
+    recording = handling_recording(0, held=36.0, **options)
+    save_recording(recording, folder.path / "001-carry.mcap")
     folder.save([GraspResult(name, 1, 30.0, True, "001-carry")])
-    model = Model.load("builtin:any")
-    assert verb.calibrated(model, folder) == (model, False)
-    why = {"carry": "uskin-curved: the arm hardly moved", "hold": "nothing is held"}
-    assert capsys.readouterr().err.startswith(f"not calibrated: {why[name]}")
+    model = normalised_model()
+    made, is_calibrated = verb.calibrated(model, folder)
+    assert (is_calibrated, made == model) == (not why, bool(why))
+    assert capsys.readouterr().err.startswith(f"not calibrated: {why}" if why else "")
 
 
 def test_a_protocol_that_is_complete_needs_no_hand(capsys, tmp_path, monkeypatch):
