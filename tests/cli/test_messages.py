@@ -104,6 +104,7 @@ MESSAGES = [
     ("label auto signal data --set share", "--set NAME=VALUE", "'share'"),
     ("label auto signal data --poses p.csv", "--poses", "tracking", "'signal'"),
     ("label auto signal data --video a.mp4", "--video", "tracking", "'signal'"),
+    ("label auto tracking data --poses gone.csv", "gone.csv"),
     ("label auto tracking data --poses a.bag", "a.bag", "--track object=NAME"),
     ("label auto tracking data --track object=/pose", "--track", "--poses BAG", "--video FILE"),
     ("label auto tracking data --video a.mp4 --poses p.csv", "--poses and --video"),
@@ -157,6 +158,7 @@ MESSAGES = [
     ("simulate new --seed=-1", "seed", "-1 given"),
     ("simulate new --film film.avi", "film.avi"),
     ("simulate new --faults field=3,rust=1", "--faults", "'rust=1'", "zero-share"),
+    ("simulate new --faults drift", "--faults drift", "a number"),
     ("simulate new --faults drift=-1", "drift", "-1"),
     ("simulate kept", "kept"),
     ("export builtin:any model.h --sensor gtac", "--like RECORDING", "--fingers N"),
@@ -178,6 +180,7 @@ MESSAGES = [
     ("sensors --template 3x3 --unit kg", "--unit", "'kg'", "N"),
     ("sensors gtac --template 3x3", "--template", "'gtac'"),
     ("doctor --history x.json", "--history", "SOURCE"),
+    ("doctor serial:///dev/null?sensor=part.json", "part.json", "'positions'"),
     ("doctor touched.parquet --history x.json", "index was touched at 2.1 s"),
 ]
 """Words of a command, and what its message must name: what was wrong, or what to type instead."""
@@ -222,6 +225,7 @@ def folder(tmp_path_factory):
     for name, text in {
         "press.csv": f"timestamp,{taxels}\n{press}",
         "p.csv": "time,x,y,z,qw,qx,qy,qz\n0,0,0,0,1,0,0,0\n1,0.1,0,0,1,0,0,0\n",
+        "part.json": '{"name": "x", "rotations": [], "normal": [0, 0, 1], "rate": 100}',
         "finger.urdf": '<robot name="finger"><link name="tip"/></robot>',
         "mug.toml": 'mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, '
         "friction = [0.7, 0.55], texture = [10e-6, 1.5e-3], finger_height = 0.024, yaw = 0.0}",
