@@ -230,15 +230,15 @@ def test_the_queue_of_a_client_keeps_the_newest_documents():
     assert [client._queue.get_nowait() for _ in range(client._queue.qsize())] == ["7", "8", "9"]
 
 
-def test_the_tare_is_refused_in_contact():
+@pytest.mark.parametrize(("n", "status"), [(60, 200), (600, 409)], ids=["open", "contact"])
+def test_the_tare_is_refused_in_contact(n, status):
     async def conversation(client, session, socket, hello):
-        early = await reply(client, "POST", "tare")
-        await wait_for(lambda: session.n_packets >= 600)
-        return early, (await reply(client, "POST", "tare"))[0]
+        await wait_for(lambda: session.n_packets >= n)
+        return (await reply(client, "POST", "tare"))[0]
 
     recording = build.grasp()
-    source = build.Lasting.of(recording, build.arrivals_of(recording)[:600], patient=True)
-    assert talk(source, conversation) == ((200, {}), 409)
+    source = build.Lasting.of(recording, build.arrivals_of(recording)[:n], patient=True)
+    assert talk(source, conversation) == status
 
 
 def test_a_recording_with_a_marker(tmp_path):
