@@ -68,18 +68,14 @@ class PluginGroup(Generic[T]):
     def text(self) -> str:
         """Return the names for the end of a message, and those of packages that are missing."""
         names = self.names()
-        return (f"; of plug-ins: {', '.join(names)}" if names else "") + self.missing_text()
-
-    def missing_text(self) -> str:
-        """Return the names of packages that are missing, for the end of a message."""
-        names = self.names()
         missing = [
             f"{name} ({package})"
             for package, parts in PACKAGE_PARTS.items()
             for name in parts.get(self.kind, ())
             if name not in names
         ]
-        return f"; not installed: {', '.join(missing)}" if missing else ""
+        installed = f"; of plug-ins: {', '.join(names)}" if names else ""
+        return installed + (f"; not installed: {', '.join(missing)}" if missing else "")
 
     def load(self, name: str) -> T | None:
         """Return a plug-in; None if there is none of that name, or it is skipped."""
