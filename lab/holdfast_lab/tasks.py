@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
-from importlib.util import find_spec
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
 
@@ -163,8 +163,7 @@ def source_digest() -> str:
     """Return a digest of the source of all packages that make results, and of their data."""
     digest = sha256()
     for package in PACKAGES:
-        spec = find_spec(package)
-        folder = Path(str(spec.origin)).parent if spec is not None else Path()
+        folder = Path(str(import_module(package).__file__)).parent
         for path in sorted(folder.rglob("*")):
             if path.suffix in SOURCE_SUFFIXES:
                 name = path.relative_to(folder).as_posix()
