@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from detector.build import cause_head, lively, model
+from detection.detector.build import cause_head, lively, model
 from holdfast.contact import Cause
-from holdfast.detector import Detector
-from holdfast.detector.tables import ESTIMATE, rules_of
-from holdfast.exporters.c_header import ctypes_of, kernel_text, structs_of
+from holdfast.detection import Detector
+from holdfast.detection.c_header import ctypes_of, kernel_text, structs_of
+from holdfast.detection.kernel_config import ESTIMATE, rules_of
 from holdfast.kernel import _extension
 
 N = 3000

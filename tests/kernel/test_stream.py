@@ -8,7 +8,7 @@ import threading
 import numpy as np
 import pytest
 
-from holdfast.features.stream import FeatureStream
+from holdfast.detection.streams import FeatureStream
 from holdfast.kernel import _extension
 from kernel.random_streams import random_plan, random_rows
 

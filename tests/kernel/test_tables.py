@@ -3,10 +3,11 @@ import copy
 import numpy as np
 import pytest
 
-from holdfast.features import Tare
-from holdfast.features.specs import ANY_FEATURES, HOLDFAST_FEATURES
-from holdfast.features.stream import FeatureStream
-from holdfast.features.tables import StreamPlan, stream_tables
+from holdfast.detection import Tare
+from holdfast.detection.kernel_config import stream_tables
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import ANY_FEATURES, HOLDFAST_FEATURES
+from holdfast.detection.streams import FeatureStream
 from holdfast.kernel import _extension
 from holdfast.sensors import sensor
 

@@ -15,15 +15,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from detector.build import cause_head, finger_model, speed_head, squared_head
+from detection.detector.build import cause_head, finger_model, speed_head, squared_head
 from holdfast.contact import Cause
-from holdfast.detector import tables
-from holdfast.detector.detection import makers
-from holdfast.exporters.c_header import Tables, kernel_text
-from holdfast.features.specs import RELATIVE_KINDS, FeatureSpec
-from holdfast.features.stream import FeatureStream
+from holdfast.detection import Debounce, Model
+from holdfast.detection import kernel_config as tables
+from holdfast.detection.c_header import Tables, kernel_text
+from holdfast.detection.specs import RELATIVE_KINDS, FeatureSpec
+from holdfast.detection.streams import FeatureStream
+from holdfast.detection.traces import makers
 from holdfast.kernel import _extension
-from holdfast.model import Debounce, Model
 from holdfast.sensors import Sensor
 
 RATE, N_SAMPLES, EVERY = 30.0, 260, 10
