@@ -11,7 +11,7 @@ import numpy as np
 
 from holdfast.contact import STABLE
 from holdfast.detection import Model, detect
-from holdfast.detection.streams import extract
+from holdfast.detection.features import extract
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
 from holdfast.recordings import Recording, Tactile
 from holdfast.resampling import true_updates

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause
 from holdfast.detection import Head, Model
-from holdfast.detection.streams import extract
+from holdfast.detection.features import extract
 from holdfast.io import load_dataset
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording

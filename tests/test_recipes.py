@@ -168,7 +168,7 @@ import sys
 from dataclasses import replace
 import numpy as np
 from holdfast import Model, fingertip_force, load_recording
-from holdfast.detection.streams import extract
+from holdfast.detection.features import extract
 
 model, recording = Model.load(sys.argv[1]), load_recording(sys.argv[2])
 assert [str(spec) for spec in model.finger("thumb").features] == ["F_a", "shear"]

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.detection import FEATURE_NAMES, FeatureSpec, Tare, haar_features
+from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.streams import extract
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 

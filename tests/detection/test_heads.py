@@ -21,7 +21,7 @@ from detection.detector.build import (
 from holdfast.contact import CAUSES, Cause
 from holdfast.detection import ANY_FINGER, FeatureSpec, FingerModel, Linear, Model
 from holdfast.detection.heads import HEAD_NAMES, Head
-from holdfast.detection.kernel_config import rules_of
+from holdfast.detection.kernel_config import model_config
 from holdfast.detection.model_files import encode
 from holdfast.errors import ModelError
 from holdfast.removed import LAST_COMMIT, REMOVED
@@ -148,9 +148,9 @@ def test_the_weights_of_causes_are_those_that_the_head_knows(with_slip):
     part = finger_model(features, 0, cause)
     part = part.with_heads(slip_head(features)) if with_slip else part
     model = Model(fingers={ANY_FINGER: part})
-    _, heads, numbers = rules_of(model, model.plan({"thumb": sensor()}, 100.0))
-    head = heads[HEAD_NAMES.index("cause")]
-    rows = numbers[head["first"] :].reshape(-1, 2)
+    _, rules, weights = model_config(model, model.plan({"thumb": sensor()}, 100.0))
+    head = rules[0]["heads"][HEAD_NAMES.index("cause")]
+    rows = weights[head["first"] :].reshape(-1, 2)
     found = dict(zip(head["causes"], rows.tolist(), strict=False))
     codes = {cause: CAUSES.index(cause) + 1 for cause in classes}
     expected = {} if with_slip else {codes[Cause.SLIP]: [0.25, 0.5]}

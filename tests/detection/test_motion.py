@@ -9,11 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.detection import Tare
+from holdfast.detection.features import extract
 from holdfast.detection.kernel_config import (
     AVERAGE_SECONDS,
     COUNT_NOISE,
     NEWTON_NOISE,
-    stream_tables,
+    stream_config,
 )
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
@@ -24,7 +25,6 @@ from holdfast.detection.specs import (
     FeatureSpec,
     kinds_of,
 )
-from holdfast.detection.streams import extract
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors import sensor as built_in
@@ -275,12 +275,12 @@ def test_the_ratio_rises_with_shear_and_falls_with_load():
 def test_a_stream_computes_only_the_kinds_that_it_needs():
     given = sensor("uskin-4x4")
     plan = StreamPlan({"a": given}, {"a": SLIP_FEATURES}, 14, Tare.parse("first"), 150.0)
-    lags = stream_tables(plan)[3]
+    lags = stream_config(plan).lags
     assert [lag["samples"] for lag in lags] == [1, 2, 4, 16]
     needed = [[lag[f"has_{what}"] for what in NEEDED] for lag in lags]
     assert needed == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
-    lags = stream_tables(plan)[3]
+    lags = stream_config(plan).lags
     assert [[lag[f"has_{what}"] for what in NEEDED] for lag in lags] == [[1, 0, 0, 0]] * 5
 
 

@@ -3,8 +3,8 @@ import pytest
 
 from detection.detector.build import RATE, broken, recording, sensor, tactile
 from holdfast.detection import Tare, fingertip_force, haar_features, parse_features
+from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.streams import FeatureStream, extract
 
 
 def plan_of(tare="first", window=6, fingers=("thumb",)):
@@ -37,25 +37,25 @@ class TestExtract:
         assert np.isfinite(found[75])
 
 
-class TestFeatureStream:
+class TestStreamPlan:
     def test_samples_share_an_instant_and_come_in_chunks(self, monkeypatch):
-        monkeypatch.setattr("holdfast.detection.streams.CHUNK_SAMPLES", 7)
+        monkeypatch.setattr("holdfast.detection.plan.CHUNK_SAMPLES", 7)
         made = recording(thumb=tactile(20, 1), index=tactile(20, 2, times=np.arange(5, 25) / RATE))
-        stream = FeatureStream(plan_of(fingers=("index", "thumb", "middle")))
-        chunks = list(stream.samples_of(made))
+        plan = plan_of(fingers=("index", "thumb", "middle"))
+        chunks = list(plan.samples_of(made))
         assert [len(chunk.times) for chunk in chunks] == [7, 7, 7, 4]
         times, present, readings = map(np.concatenate, zip(*chunks, strict=True))
         assert np.array_equal(times, np.arange(25) / RATE)
         assert present.sum(axis=0).tolist() == [20, 20, 0]
         for place, name in enumerate(("index", "thumb")):
-            rows = readings[present[:, place], stream.slices[name]]
+            rows = readings[present[:, place], plan.slices[name]]
             assert np.array_equal(rows, made.modules[name].readings)
 
     def test_the_tare_of_an_interval(self):
         made = recording(thumb=tactile(seed=3))
-        stream = FeatureStream.for_recording(plan_of("0.5:0.9"), made)
+        plan = plan_of("0.5:0.9").for_recording(made)
         expected = made.modules["thumb"].readings[50:90].mean(axis=0)
-        assert np.allclose(stream.baseline, expected)
+        assert np.allclose(plan.baseline, expected)
 
     def test_no_baseline_before_the_first_sample(self):
-        assert not FeatureStream(plan_of()).baseline.any()
+        assert not plan_of().baseline.any()

@@ -1,10 +1,5 @@
-"""The detector of a model as one C99 header: files of the kernel, and tables of the model.
+"""The detector of a model as one C99 header: files of the kernel, and constants of the model."""
 
-The structs in the text of the kernel are their only definition: `structs_of` reads them, and the
-tables and sizes of a model follow from what it finds.
-"""
-
-import ctypes
 import math
 import re
 import shutil
@@ -19,39 +14,17 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.contact import Fault, Reason
-from holdfast.detection.heads import HEAD_NAMES
-from holdfast.detection.kernel_config import Struct, model_table, rules_of
+from holdfast.detection.kernel_config import model_config, stream_config
 from holdfast.detection.model import Model
 from holdfast.detection.plan import OPEN_HAND, Start, StreamPlan
-from holdfast.detection.streams import FeatureStream
 from holdfast.errors import ModelError
+from holdfast.kernel.structs import fields_of, types_of
 from holdfast.sensors import Sensor
 
 LINE = 100
-C_TYPES: dict[str, Any] = {
-    "double": ctypes.c_double, "bool": ctypes.c_bool, "size_t": ctypes.c_size_t,
-    "int32_t": ctypes.c_int32, "uint32_t": ctypes.c_uint32,
-    "int64_t": ctypes.c_int64, "uint64_t": ctypes.c_uint64,
-}  # fmt: skip
-TableRows = Sequence[Struct] | Sequence[float]
-
-
-class Field(NamedTuple):
-    """Field of a struct in C.
-
-    Attributes:
-        name: of the field.
-        kind: its type, or that of its elements.
-        length: expression of the number of elements, of an array.
-        is_pointer: whether the field is a pointer.
-    """
-
-    name: str
-    kind: str
-    length: str | None
-    is_pointer: bool
 
 
 def kernel_text() -> str:
@@ -68,38 +41,12 @@ def kernel_text() -> str:
     return text_of("holdfast.c").strip()
 
 
-def structs_of(text: str) -> dict[str, list[Field]]:
-    """Return the fields of each struct in the text of the kernel, their only definition.
-
-    Example:
-        >>> structs_of("typedef struct { double time; hf_real m[3]; } holdfast_x;")["holdfast_x"]
-        [Field(name='time', kind='double', length=None, is_pointer=False),
-         Field(name='m', kind='hf_real', length='3', is_pointer=False)]
-    """
-    # Comments hold semicolons and braces too.
-    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    found = {}
-    for body, name in re.findall(r"typedef struct \{([^}]*)\} (holdfast_\w+);", text):
-        fields: list[Field] = []
-        for line in filter(None, (" ".join(part.split()) for part in body.split(";"))):
-            array = re.fullmatch(r"HF_ARRAY\((\w+), (\w+), (.+)\)", line)
-            plain = re.fullmatch(r"(?:const )?(\w+) (\*?)(\w+)(?:\[(.+)\])?", line)
-            if array:
-                fields.append(Field(array[2], array[1], array[3], is_pointer=False))
-            elif plain:
-                fields.append(Field(plain[3], plain[1], plain[4], is_pointer=bool(plain[2])))
-            else:
-                raise ValueError(f"struct {name}: a field, or HF_ARRAY, expected; {line!r} given")
-        found[name] = fields
-    return found
-
-
 class Tables:
-    """The tables of a model as texts in C.
+    """The constants of a model as texts in C.
 
     Attributes:
-        structs: fields of the structs of the kernel.
-        types: these structs with the sizes of the hand, for ctypes.
+        fields: of the structs of the kernel.
+        types: layouts of these structs with the sizes of the hand.
         sizes: of the hand, by the names of their macros.
         texts: definitions.
         n_bytes: of all of them.
@@ -107,36 +54,30 @@ class Tables:
     """
 
     def __init__(self, kernel: str, model: Model, plan: StreamPlan, *, single: bool) -> None:
-        self.structs, self.texts, self.n_bytes = structs_of(kernel), list[str](), 0
+        self.fields, self.texts, self.n_bytes = fields_of(kernel), list[str](), 0
         self._single = single
-        tables = FeatureStream(plan).tables()
-        hand, fingers, features, lags, used, rotations, places, baseline = tables
-        rules, heads, weights = rules_of(model, plan)
-        n_heads = len(HEAD_NAMES)
-        own_heads = [{"heads": heads[k : k + n_heads]} for k in range(0, len(heads), n_heads)]
-        self.sizes: dict[str, Any] = {k: n for k, n in hand.items() if k.startswith("n_")}
+        stream, detector, baseline = stream_config(plan), model_config(model, plan), plan.baseline
+        names = stream.hand.dtype.names or ()
+        self.sizes = {name: int(stream.hand[name][0]) for name in names if name.startswith("n_")}
         self.sizes["n_taxels"] = len(baseline)
-        # Lengths of arrays in the kernel are numbers, its own constants, or sizes of the hand.
-        names = {name: int(value) for name, value in re.findall(r"(\w+_N_\w+) = (\d+)", kernel)}
-        names |= {f"HOLDFAST_{name.upper()}": n for name, n in self.sizes.items()}
-        self.types = ctypes_of(self.structs, names, single=single)
+        macros = {f"HOLDFAST_{name.upper()}": n for name, n in self.sizes.items()}
+        self.types = types_of(kernel, macros, single=single)
         self.has_baseline = bool(np.any(baseline))
-        self._add("holdfast_finger", "fingers", fingers)
-        self._add("holdfast_feature", "features", features)
-        no_lag: Struct = {field.name: 0 for field in self.structs["holdfast_lag"]}
-        self._add("holdfast_lag", "lags", lags or [no_lag])  # C has no empty arrays
+        self._add("holdfast_finger", "fingers", stream.fingers)
+        self._add("holdfast_feature", "features", stream.features)
+        no_lag = np.zeros(1, stream.lags.dtype)  # C has no empty arrays
+        self._add("holdfast_lag", "lags", stream.lags if len(stream.lags) else no_lag)
         for name, values in (
-            ("used", used), ("rotations", rotations), ("places", places), ("weights", weights),
-            *[("baseline", baseline)] * self.has_baseline,
+            ("used", stream.used), ("rotations", stream.rotations), ("places", stream.places),
+            ("weights", detector.weights), *[("baseline", baseline)] * self.has_baseline,
         ):  # fmt: skip
-            self._add("hf_real", name, values.ravel().tolist())
-        self._add("holdfast_hand", "hand", [hand], is_array=False)
-        self._add("holdfast_rule", "rules", [a | b for a, b in zip(rules, own_heads, strict=True)])
-        table = model_table(model, plan) | {"n_weights": len(weights)}
-        self._add("holdfast_model", "model", [table], is_array=False)
+            self._add("hf_real", name, values.ravel())
+        self._add("holdfast_hand", "hand", stream.hand, is_array=False)
+        self._add("holdfast_rule", "rules", detector.rules)
+        self._add("holdfast_model", "model", detector.model, is_array=False)
 
-    def _add(self, kind: str, name: str, rows: TableRows, *, is_array: bool = True) -> None:
-        self.n_bytes += len(rows) * ctypes.sizeof(self.types[kind])
+    def _add(self, kind: str, name: str, rows: npt.NDArray[Any], *, is_array: bool = True) -> None:
+        self.n_bytes += len(rows) * self.types[kind].itemsize
         # Lines of about 100 characters: C99 guarantees no more than 4095 in one.
         lines = [""]
         for row in [self._text(kind, row) for row in rows]:
@@ -147,20 +88,18 @@ class Tables:
         length = f"[{len(rows)}] = {{\n{body}}};" if is_array else f" =\n{body};"
         self.texts.append(f"static const {kind} hf_{name}{length}")
 
-    def _text(self, kind: str, value: Any) -> str:  # noqa: ANN401 (a row, or a number)
+    def _text(self, kind: str, value: Any) -> str:  # noqa: ANN401 (a struct, or a number)
         """Return the initializer of a struct or of a number."""
-        if kind in self.structs:
+        if kind in self.fields:
             parts = []
-            for field in self.structs[kind]:
-                if field.is_pointer:  # to the table of that name, of which there is one hand
+            for field in self.fields[kind]:
+                if field.is_pointer:  # to the table of that name; of the hand there is one
                     part = f"&hf_{field.name}" if field.name == "hand" else f"hf_{field.name}"
                 elif field.length is None:
                     part = self._text(field.kind, value[field.name])
                 else:
-                    values = value.get(field.name)
-                    if not isinstance(values, list):  # elements of a flat struct of NumPy
-                        values = [value[f"{field.name}[{k}]"] for k in range(int(field.length))]
-                    part = f"{{{', '.join(self._text(field.kind, item) for item in values)}}}"
+                    items = (self._text(field.kind, item) for item in value[field.name])
+                    part = f"{{{', '.join(items)}}}"
                 parts.append(part)
             return f"{{{', '.join(parts)}}}"
         if kind == "bool":
@@ -174,41 +113,6 @@ class Tables:
         # The shortest text that is read back as the same number, in either precision.
         is_single = self._single and kind == "hf_real"
         return f"{np.float32(value)!s}f" if is_single else repr(float(value))
-
-
-def ctypes_of(
-    structs: Mapping[str, Sequence[Field]], names: Mapping[str, int], *, single: bool
-) -> dict[str, Any]:
-    """Return types of ctypes for the structs of an exported header, for their sizes.
-
-    Args:
-        structs: fields of each struct.
-        names: numbers in the lengths of arrays.
-        single: numbers are of single precision.
-    """
-    found = C_TYPES | {"hf_real": ctypes.c_float if single else ctypes.c_double}
-    for name, fields in structs.items():
-        members = []
-        for field in fields:
-            # A struct stands after those that it contains, as C needs it: all kinds are found.
-            kind = ctypes.c_void_p if field.is_pointer else found[field.kind]
-            if field.length is not None and not field.is_pointer:
-                kind *= _length(field.length, names)
-            members.append((field.name, kind))
-        found[name] = type(name, (ctypes.Structure,), {"_fields_": members})
-    return found
-
-
-def _length(expression: str, names: Mapping[str, int]) -> int:
-    """Return a product of numbers, names and sums of two of them.
-
-    Example:
-        >>> _length("N * (M + 1) * 3", {"N": 2, "M": 4})
-        30
-    """
-    numbers = re.sub(r"[A-Z]\w+|[A-Z]", lambda found: str(names[found[0]]), expression)
-    factors = re.sub(r"\((\d+) \+ (\d+)\)", lambda x: str(int(x[1]) + int(x[2])), numbers)
-    return math.prod(map(int, factors.split("*")))
 
 
 HEADER_FIELDS = 16
@@ -262,7 +166,7 @@ def header_of(
         )
     kernel = kernel_text()
     tables = Tables(kernel, model, plan, single=single)
-    state_size = ctypes.sizeof(tables.types["holdfast_detector_memory"]) + HEADER_FIELDS
+    state_size = tables.types["holdfast_detector_memory"].itemsize + HEADER_FIELDS
     # Names in capitals stand between @ in the template.
     parts = {
         "VERSION": version("holdfast"),
@@ -293,7 +197,7 @@ def header_of(
     times = tuple(
         f"{name}.{field.name}"
         for name in ("mask", "track", "motion", "finger_memory", "decision")
-        for field in tables.structs[f"holdfast_{name}"]
+        for field in tables.fields[f"holdfast_{name}"]
         if field.kind == "double"
     )
     return CHeader(text, state_size, tables.n_bytes, times if single else ())

@@ -14,18 +14,14 @@ import numpy as np
 import numpy.typing as npt
 from numpy import ndarray
 
-from holdfast.contact import (
-    ContactEvent,
-    HandEstimate,
-    StateChanges,
-)
-from holdfast.detection import kernel_config as tables
+from holdfast.contact import ContactEvent, HandEstimate
+from holdfast.detection.kernel_config import model_config, packed, stream_config, with_thresholds
 from holdfast.detection.model import Model
 from holdfast.detection.plan import Start, StreamPlan, declared_baselines
-from holdfast.detection.streams import FeatureStream
-from holdfast.detection.traces import STATE_BY_CODE, Chunk, Detection, detection_of, makers
+from holdfast.detection.traces import STATE_BY_CODE, Chunk, Detection, EstimateTypes, detection_of
 from holdfast.errors import ModelError, StreamError
 from holdfast.kernel import _extension
+from holdfast.kernel.structs import struct_type
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
@@ -87,14 +83,20 @@ class Detector:
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
         known = declared_baselines({BASELINES: baselines}, sensors)
-        plan = replace(plan, start=Start(in_contact, known))
-        # Last, so that a wrong finger or taxel is reported first, as by `for_recording`.
-        if plan.tare.kind == "interval":
+        # Last, so that a wrong finger or taxel is reported first.
+        if plan.tare.kind == "interval" and baselines is None:
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
                 "seconds, 'first' or 'none' expected where samples come one by one"
             )
-        self._start(model, FeatureStream(plan))
+        self._plan = replace(plan, start=Start(in_contact, known))
+        self._names = (*plan.fingers, HAND)
+        # Only `set_thresholds` replaces the rules. `_readings` and `_present` are memory for
+        # samples of other types.
+        self._settings, self._rules, self._weights = model_config(model, self._plan)
+        self._readings = np.zeros_like(self._plan.baseline)
+        self._present = np.zeros(len(plan.fingers), dtype=np.bool_)
+        self._begin()
 
     @classmethod
     def for_recording(
@@ -117,40 +119,25 @@ class Detector:
             ValueError: a tare by interval finds no samples, or `ignore` names a finger or a
                 taxel that does not exist.
         """
-        # Past `__init__`, which refuses the tare by interval that a recording may have.
-        detector = cls.__new__(cls)
-        sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-        plan = _ignoring(model.plan(sensors, recording.rate), ignore)
-        detector._start(model, FeatureStream.for_recording(plan, recording))
-        return detector
+        modules = {name: module.sensor for name, module in recording.modules.items()}
+        plan = _ignoring(model.plan(model.fingers_of(modules), recording.rate), ignore)
+        start = plan.for_recording(recording).start
+        return cls(
+            model, modules, recording.rate,
+            ignore=ignore, in_contact=start.loaded, baselines=start.baselines,
+        )  # fmt: skip
 
-    def _start(self, model: Model, stream: FeatureStream) -> None:
-        plan = stream.plan
-        # What holds for the life of the detector; only `set_thresholds` replaces the rules.
-        # `_readings` and `_present` are memory for samples of other types.
-        self._names = (*plan.fingers, HAND)
-        self._settings = tables.model_table(model, plan)
-        self._parts = [model.finger(*finger) for finger in plan.sensors.items()]
-        self._rules = tables.rules_of(model, plan)
-        self._readings = np.zeros_like(stream.baseline)
-        self._present = np.zeros(len(plan.fingers), dtype=np.bool_)
-        self._slots = {
-            finger: (place, self._readings[taxels], (taxels.stop - taxels.start, 3))
-            for place, (finger, taxels) in enumerate(stream.slices.items())
-        }
-        self._use(stream)
-
-    def _use(self, stream: FeatureStream) -> None:
-        """Set a new feature stream, and an empty decision memory."""
-        self._stream = stream
-        # The kernel appends to `_transitions` at each change; `events` and `run` turn them into
-        # events, so that an update makes no Python objects for them.
-        self._changes = StateChanges(self._names)
-        self._events: deque[ContactEvent] = deque(maxlen=MAX_EVENTS)
+    def _begin(self) -> None:
+        """Begin before the first sample, without tare and events."""
+        # (time, codes before, codes after) of each change of state, which the kernel appends:
+        # `events` turns them into events, so that an update makes no Python objects for them.
         self._transitions: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
+        plan = self._plan
         self._kernel = _extension.Detector(
-            stream.tables(), self._settings, *self._rules,
-            makers(stream.plan.fingers, self._parts), ndarray, self._transitions.append,
+            *packed(stream_config(plan)), plan.baseline.tobytes(), self._settings.tobytes(),
+            self._rules.tobytes(), self._weights.tobytes(),
+            EstimateTypes({finger: index for index, finger in enumerate(plan.fingers)}), ndarray,
+            self._transitions.append,
         )  # fmt: skip
 
     def __getstate__(self) -> object:
@@ -160,13 +147,13 @@ class Detector:
     @property
     def n_fingers(self) -> int:
         """Number of fingers of the model, on which the state of the hand depends."""
-        return int(self._settings["n_model_fingers"])
+        return int(self._settings["n_model_fingers"][0])
 
     def baselines(self) -> dict[str, Array]:
         """Return (n_taxels, 3) the tare of each finger whose tare is complete [its unit]."""
         baseline = np.empty_like(self._readings)
         complete = self._kernel.baselines(baseline)
-        slices = self._stream.slices.items()
+        slices = self._plan.slices.items()
         return {
             f: baseline[taxels] for (f, taxels), done in zip(slices, complete, strict=True) if done
         }
@@ -177,9 +164,10 @@ class Detector:
         Args:
             in_contact: whether the next samples are load; None for as before.
         """
-        plan = self._stream.plan
-        loaded = plan.start.loaded if in_contact is None else in_contact
-        self._use(FeatureStream(replace(plan, start=replace(plan.start, loaded=loaded))))
+        if in_contact is not None:
+            start = replace(self._plan.start, loaded=in_contact)
+            self._plan = replace(self._plan, start=start)
+        self._begin()
 
     def set_thresholds(self, thresholds: Mapping[str, float]) -> None:
         """Change the probability from which a contact is stable, from the next sample on.
@@ -194,18 +182,16 @@ class Detector:
                 changed then.
         """
         check_thresholds(thresholds)
-        unknown = thresholds.keys() - self._slots.keys()
-        if unknown:
+        fingers = self._plan.fingers
+        if unknown := thresholds.keys() - set(fingers):
             raise ValueError(
                 f"threshold of {', '.join(sorted(unknown))} given; "
-                f"the detector has {', '.join(self._slots)}"
+                f"the detector has {', '.join(fingers)}"
             )
-        # A copy, so that nothing has changed if the kernel refuses it.
-        limits, heads, weights = self._rules
-        rules = limits, [dict(head) for head in heads], weights
-        for finger, threshold in thresholds.items():
-            tables.stable_head(rules, self._slots[finger][0])["threshold"] = threshold
-        self._kernel.set_rules(*rules)
+        rules = with_thresholds(
+            self._rules, {fingers.index(finger): t for finger, t in thresholds.items()}
+        )
+        self._kernel.set_rules(rules.tobytes(), self._weights.tobytes())
         self._rules = rules
 
     def update(self, samples: Mapping[str, npt.ArrayLike], time: float) -> HandEstimate:
@@ -235,10 +221,14 @@ class Detector:
 
     def events(self) -> list[ContactEvent]:
         """Return the changes of state since the last call, at most `MAX_EVENTS`, oldest first."""
-        self._settle_transitions()
-        events = list(self._events)
-        self._events.clear()
-        return events
+        events = [
+            ContactEvent(name, STATE_BY_CODE[new], STATE_BY_CODE[old], time)
+            for time, before, after in self._transitions
+            for name, new, old in zip(self._names, after, before, strict=True)
+            if new != old
+        ]
+        self._transitions.clear()
+        return events[-MAX_EVENTS:]
 
     def run(self, recording: Recording) -> Detection:
         """Process all samples of a recording, after those that the detector has had.
@@ -255,27 +245,24 @@ class Detector:
                 or begins before the last sample.
         """
         # All is checked before the first sample: a recording is processed as a whole or not.
-        modules = {f: recording.modules[f] for f in self._slots if f in recording.modules}
+        fingers = self._plan.fingers
+        modules = {f: recording.modules[f] for f in fingers if f in recording.modules}
         if not any(module.n_samples for module in modules.values()):
             raise StreamError(
                 f"recording {recording.name!r} has samples of {', '.join(recording.modules)}; "
-                f"the model is for {', '.join(self._slots)}"
+                f"the model is for {', '.join(fingers)}"
             )
         for finger, module in modules.items():
             self._check_shape(finger, module.readings.shape[1:])
         self._check_time(min(float(m.times[0]) for m in modules.values() if m.n_samples))
-        self._settle_transitions()
-        fingers, chunks = self._stream.plan.fingers, self._estimates(recording)
-        return detection_of(recording, fingers, self._parts, chunks)
+        return detection_of(recording, fingers, self._rules, self._estimates(recording))
 
     def _estimates(self, recording: Recording) -> Iterator[Chunk]:
         """Yield the estimates of all samples of a recording, in chunks."""
-        for times, present, readings in self._stream.samples_of(recording):
-            estimates, numbers = tables.estimate_rows(*present.shape)
+        for times, present, readings in self._plan.samples_of(recording):
+            estimates = np.zeros(present.shape, struct_type("holdfast_finger_estimate"))
             hand = np.empty(len(times))
-            self._kernel.run(readings, present, times, numbers, hand)
-            codes = np.column_stack([estimates["state"], hand.astype(np.int64)])
-            self._events += self._changes.update_chunk(times, codes)
+            self._kernel.run(readings, present, times, estimates.view(np.float64), hand)
             yield Chunk(times, present, estimates, hand)
 
     def _check_time(self, time: float) -> None:
@@ -285,41 +272,29 @@ class Detector:
             raise StreamError(f"time {time:.15g} s given{after}; finite, increasing times expected")
 
     def _check_shape(self, finger: str, shape: tuple[int, ...]) -> None:
-        expected = self._slots[finger][2]
-        if shape != expected:
+        sensor = self._plan.sensors[finger]
+        if shape != (sensor.n_taxels, 3):
             raise StreamError(
-                f"{finger}: a sample of shape {shape} given, {expected} expected "
-                f"({self._stream.plan.sensors[finger].name})"
+                f"{finger}: a sample of shape {shape} given, {(sensor.n_taxels, 3)} expected "
+                f"({sensor.name})"
             )
 
     def _store(self, samples: Mapping[str, npt.ArrayLike]) -> None:
         """Copy samples of any type for the kernel."""
-        slots = self._slots
+        fingers = self._plan.fingers
         self._present[:] = False
         for finger, sample in samples.items():
-            if finger not in slots:
-                raise StreamError(f"finger {finger!r} given; the model is for {', '.join(slots)}")
-            place, slot, shape = slots[finger]
+            if finger not in fingers:
+                raise StreamError(f"finger {finger!r} given; the model is for {', '.join(fingers)}")
+            target = self._readings[self._plan.slices[finger]]
             try:
                 values = sample if isinstance(sample, ndarray) else np.asarray(sample)
-                if values.shape != shape:
-                    self._check_shape(finger, values.shape)
-                slot[...] = values
-            except (
-                ValueError,
-                TypeError,
-                OverflowError,
-            ) as cause:  # of objects, or rows of lengths
-                raise StreamError(f"{finger}: {shape} numbers expected; {cause}") from cause
-            self._present[place] = True
-
-    def _settle_transitions(self) -> None:
-        """Turn the changes of state of the last updates into events."""
-        for time, *codes in self._transitions:
-            before, after = ([STATE_BY_CODE[code] for code in states] for states in codes)
-            self._changes.states = before  # the change before this one may be forgotten
-            self._events += self._changes.update(after, time)
-        self._transitions.clear()
+                self._check_shape(finger, values.shape)
+                target[...] = values
+            except (ValueError, TypeError, OverflowError) as cause:
+                # Of objects, or of rows of different lengths.
+                raise StreamError(f"{finger}: {target.shape} numbers expected; {cause}") from cause
+            self._present[fingers.index(finger)] = True
 
 
 def detect(model: Model, recording: Recording, *, in_contact: bool | None = None) -> Detection:

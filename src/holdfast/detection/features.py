@@ -1,13 +1,15 @@
-"""Features of whole arrays and of recordings: fingertip force, Haar window, and a pandas frame."""
+"""Fingertip force and features of whole arrays and of recordings."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.detection.plan import Tare, TareArgument, baseline_of, offline_tare
+from holdfast.detection.kernel_config import packed, stream_config
+from holdfast.detection.plan import StreamPlan, Tare, TareArgument, baseline_of, offline_tare
 from holdfast.detection.specs import DEFAULT_WINDOW, check_window
 from holdfast.errors import RecordingError, require_extras
+from holdfast.kernel import _extension
 from holdfast.kernel.batch import fill_fingertip_force, fill_haar_features
 from holdfast.recordings import GAP_PERIODS, Recording, Tactile
 from holdfast.sensors import Sensor
@@ -247,3 +249,46 @@ def features_frame(
             part.insert(1, "finger", finger)
             parts.append(part)
     return pd.concat(parts).sort_values("time", kind="stable", ignore_index=True)
+
+
+class FingerFeatures(NamedTuple):
+    """Features of one finger over a recording.
+
+    Attributes:
+        features: (n, n_features); NaN where there are none.
+        amplitude: (n,) F_a [unit of the readings]; NaN where there is no force.
+    """
+
+    features: Array
+    amplitude: Array
+
+
+def extract(plan: StreamPlan, recording: Recording) -> dict[str, FingerFeatures]:
+    """Return the features of every finger of the plan, at each of its samples.
+
+    Args:
+        plan: fingers, features, tare and rate.
+        recording: that has all fingers of the plan.
+
+    Returns:
+        By finger, one row for each sample of its module.
+
+    Raises:
+        ValueError: a tare by interval finds no samples.
+    """
+    plan = plan.for_recording(recording)
+    kernel = _extension.Stream(*packed(stream_config(plan)), plan.baseline.tobytes())
+    chunks: dict[str, list[FingerFeatures]] = {finger: [] for finger in plan.fingers}
+    for times, present, readings in plan.samples_of(recording):
+        features = np.full((*present.shape, plan.width), np.nan)
+        amplitude = np.full(present.shape, np.nan)
+        kernel.advance(readings, present, times, features, amplitude)
+        for index, finger in enumerate(plan.fingers):
+            rows, n_features = present[:, index], len(plan.features[finger])
+            chunks[finger].append(
+                FingerFeatures(features[rows, index, :n_features], amplitude[rows, index])
+            )
+    return {
+        finger: FingerFeatures(*map(np.concatenate, zip(*parts, strict=True)))
+        for finger, parts in chunks.items()
+    }

@@ -13,10 +13,6 @@ from holdfast.errors import ModelError
 from holdfast.kernel import _extension
 from holdfast.sensors.types import Array
 
-MAX_DEVIATION = 5.0
-"""Squares are of values of at most this many standard deviations: a larger one is no stronger sign
-of a slip, nor of a glitch."""
-
 
 class Linear(msgspec.Struct, frozen=True, forbid_unknown_fields=True, tag="linear"):
     """Linear function of standardised features, with one value for each output.

@@ -1,30 +1,27 @@
-"""Tables of the C kernel, by the names of its structs: those of a plan, and of a model."""
+"""Constants of the C kernel as arrays of its structs: those of a plan, and those of a model."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.contact import CAUSES, SLIP_CODE
 from holdfast.detection.heads import HEAD_NAMES, Head
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec
 from holdfast.kernel import _extension
+from holdfast.kernel.structs import Structs, structs
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
 if TYPE_CHECKING:
     from holdfast.detection.model import FingerModel, Model
 
-Struct = dict[str, Any]
-StreamTables = tuple[Struct, list[Struct], list[Struct], list[Struct], Array, Array, Array]
-"""Hand, fingers, features of all fingers, lags; then used taxels, rotations and places in lanes."""
+Row = dict[str, Any]
+"""Values of a struct, by the names of its fields in `kernel/kernel.h` or `kernel/detector.h`."""
 
 TARE_KINDS = ("seconds", "first", "none", "interval")
 """Kinds of tare. The code of a kind is its position."""
-N_COMPONENTS = 4
-"""Values with a Haar window: F_a, and the components of F_tip."""
 COUNT_NOISE = float(1 / np.sqrt(12))
 """Standard deviation of rounding to whole counts: the least noise of a reading [count]."""
 NEWTON_NOISE = 1e-6
@@ -43,10 +40,6 @@ SUM_OF_WEIGHTS = 1.0 + float(np.sqrt(2.0)) / 1.5 + float(np.sqrt(3.0)) / 1.6
 MAX_EARTH_FIELDS = {"anyskin": 130.0}
 """Twice the field of the earth, by sensors whose readings are in microtesla: it is at most 65 µT,
 and changes by twice that when a hand is turned over [µT]."""
-GAP_LIMIT_PERIODS = 3.0003
-"""A step in time of more sample periods is a gap. The part over 3 allows for rounding."""
-MAX_BRIDGED_SECONDS = 0.10001
-"""Longest gap that windows in seconds bridge: 0.1 s, with an allowance for rounding."""
 AVERAGE_SECONDS = 0.02
 """Time constant of averages of squared second differences [s]."""
 RING_SPARE = 2
@@ -54,34 +47,79 @@ RING_SPARE = 2
 for bursts, and for a rate that rises."""
 
 
-def stream_tables(plan: StreamPlan) -> StreamTables:
-    """Return the tables of a stream: hand, fingers, features, lags, and three of taxels."""
+class StreamConfig(NamedTuple):
+    """Constants of a feature stream.
+
+    Attributes:
+        hand: (1,) of `holdfast_hand`.
+        fingers: (n_fingers,) of `holdfast_finger`.
+        features: (n_fingers * n_features,) of `holdfast_feature`.
+        lags: (n_lags,) of `holdfast_lag`.
+        used: (n_lanes,) 1 for each taxel that contributes, else 0.
+        rotations: (9 n_lanes,) from the taxel frames to the fingertip frame.
+        places: (3 n_lanes,) of the taxels about their centroid, in radii of the patch.
+    """
+
+    hand: Structs
+    fingers: Structs
+    features: Structs
+    lags: Structs
+    used: Array
+    rotations: Array
+    places: Array
+
+
+class ModelConfig(NamedTuple):
+    """Constants of a model, for the fingers of a plan.
+
+    Attributes:
+        model: (1,) of `holdfast_model`.
+        rules: (n_fingers,) of `holdfast_rule`.
+        weights: numbers of all heads.
+    """
+
+    model: Structs
+    rules: Structs
+    weights: Array
+
+
+def packed(config: StreamConfig | ModelConfig) -> tuple[bytes, ...]:
+    """Return the constants as the extension takes them: bytes, which nothing can change."""
+    return tuple(array.tobytes() for array in config)
+
+
+def stream_config(plan: StreamPlan) -> StreamConfig:
+    """Return the constants of a stream."""
     features = [plan.features[finger] for finger in plan.fingers]
     seconds = sorted({spec.seconds for specs in features for spec in specs if spec.seconds})
     lags = [_lag(lag, plan.rate, [s for specs in features for s in specs]) for lag in seconds]
     used = [plan.used(finger) for finger in plan.fingers]
-    n_taxels = [len(flags) for flags in used]
     # Fingers begin at whole vectors of the processor, so that its loops need no remainder.
-    n_lanes = [-(-n // _extension.LANES) * _extension.LANES for n in n_taxels]
+    n_lanes = [-(-len(flags) // _extension.LANES) * _extension.LANES for flags in used]
     sensors = plan.sensors.values()
+    first_taxels = [taxels.start for taxels in plan.slices.values()]
     fingers = [
         _finger(sensor, int(flags.sum()), plan, specs)
-        | {"first_taxel": sum(n_taxels[:f]), "n_taxels": n_taxels[f], "first": sum(n_lanes[:f])}
-        for f, (sensor, flags, specs) in enumerate(zip(sensors, used, features, strict=True))
+        | {"first_taxel": first_taxel, "n_taxels": len(flags), "first": sum(n_lanes[:f])}
+        for f, (sensor, flags, specs, first_taxel) in enumerate(
+            zip(sensors, used, features, first_taxels, strict=True)
+        )
     ]
     taxels = list(zip(sensors, used, n_lanes, strict=True))
-    return (
-        _hand(plan, features, lags) | {"n_lanes": sum(n_lanes)},
-        fingers,
-        [row for specs in features for row in _features(specs, plan.width, seconds)],
-        lags,
+    return StreamConfig(
+        structs("holdfast_hand", [_hand(plan, features, lags) | {"n_lanes": sum(n_lanes)}]),
+        structs("holdfast_finger", fingers),
+        structs("holdfast_feature", [
+            row for specs in features for row in _features(specs, plan.width, seconds)
+        ]),
+        structs("holdfast_lag", lags),
         np.concatenate([_in_lanes(flags.astype(np.float64), n) for _, flags, n in taxels]),
         np.concatenate(
             # A rotation of 0 takes an ignored taxel out of all sums without a branch.
             [_in_lanes(np.where(u[:, None, None], s.rotations, 0), n) for s, u, n in taxels]
         ),
         np.concatenate([_in_lanes(_places(s, u), n) for s, u, n in taxels]),
-    )
+    )  # fmt: skip
 
 
 def n_levels(window: int) -> int:
@@ -89,9 +127,7 @@ def n_levels(window: int) -> int:
     return (window // 2).bit_length()
 
 
-def _hand(
-    plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Sequence[Struct]
-) -> Struct:
+def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Sequence[Row]) -> Row:
     tare, specs = plan.used_tare, [spec for own in features for spec in own]
     n_history = max([plan.window, *(spec.window for spec in specs)])
     # The stretch of the tare shows the noise too, as nothing touches; where the tare takes no
@@ -106,7 +142,9 @@ def _hand(
         "n_features": plan.width,
         "n_lags": len(lags),
         "n_history": n_history,
-        "n_channels": N_COMPONENTS if any(KINDS[spec.kind].of_components for spec in specs) else 1,
+        "n_channels": _extension.N_COMPONENTS
+        if any(KINDS[spec.kind].of_components for spec in specs)
+        else 1,
         "n_levels": n_levels(n_history),
         "n_track": RING_SPARE * reach + 1,
         "period": 1.0 / plan.rate,
@@ -120,7 +158,7 @@ def _hand(
     }
 
 
-def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[FeatureSpec]) -> Struct:
+def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[FeatureSpec]) -> Row:
     """Return the constants of a finger; each used taxel rounds its readings."""
     # Without a range nothing is near its end, and the mean of the readings may change at will.
     low, high = sensor.range or (-np.inf, np.inf)
@@ -129,7 +167,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
     # Haar windows count samples, which a gap breaks; lags in seconds bridge a short one by time. So
     # a finger bridges gaps only if all its features are over lags, and is ready after two samples.
     in_seconds = all(spec.seconds for spec in specs)
-    bridges, gap = in_seconds and bool(specs), GAP_LIMIT_PERIODS / plan.rate
+    bridges, gap = in_seconds and bool(specs), _extension.GAP_LIMIT_PERIODS / plan.rate
     return {
         "n_used": float(n_used),
         "low": low,
@@ -144,19 +182,19 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
         if sensor.magnetic and not plan.zero_unknown
         else 0.0,
-        "max_step": max(gap, MAX_BRIDGED_SECONDS) if bridges else gap,
-        **{f"normal[{axis}]": float(value) for axis, value in enumerate(sensor.normal)},
+        "max_step": max(gap, _extension.MAX_BRIDGED_SECONDS) if bridges else gap,
+        "normal": sensor.normal,
         "sigma_window": plan.window,
         "ready_window": 2 if in_seconds else max([plan.window, *(s.window for s in specs)]),
         "bridges": bridges,
     }
 
 
-def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]) -> list[Struct]:
+def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]) -> list[Row]:
     """Return the features of a finger, padded to those of the finger that has most."""
     # Scope is left out: `hand` takes the largest of values that each finger has computed anyway.
     own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
-    padding: Struct = {
+    padding: Row = {
         "kind": -1, "transform": 0, "of_hand": False, "window": 0, "lag": 0, "same_as": 0,
         "floor": 0.0,
     }  # fmt: skip
@@ -174,7 +212,7 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
     ] + [padding] * (width - len(specs))
 
 
-def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Struct:
+def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
     families = {KINDS[spec.kind].family for spec in specs if spec.seconds == seconds}
     return {
         "samples": max(1, round(seconds * rate)),
@@ -201,39 +239,10 @@ def _in_lanes(values: Array, n_lanes: int) -> Array:
     return np.pad(own, ((0, 0), (0, n_lanes - own.shape[1]))).ravel()
 
 
-ALWAYS_CONTACT, BY_FORCE, BY_NOISE, BY_LOAD = range(4)
-
-Rules = tuple[list[Struct], list[Struct], Array]
-"""Rules of the fingers, four heads for each of them, and the numbers of all heads."""
-
-ESTIMATE = np.dtype(
-    [
-        ("time", np.float64), ("state", np.int32), ("reason", np.int32), ("cause", np.int32),
-        ("faults", np.uint32), ("taxels", np.int64), ("probability", np.float64),
-        ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
-        ("sigma", np.float64), ("force", np.float64, 3),
-    ]
-)  # fmt: skip
-"""`holdfast_finger_estimate`."""
-
-
-def model_table(model: "Model", plan: StreamPlan) -> Struct:
-    """Return the settings of a model that hold for all fingers."""
-    return {
-        "n_model_fingers": model.n_fingers(plan.fingers),
-        "hysteresis": model.debounce.hysteresis,
-        "min_duration": model.debounce.min_duration,
-        "hold": model.debounce.hold,
-        "has_filter": model.debounce.switching_rate > 0,
-        "switching": model.debounce.switching_rate,
-        "zero_unknown": plan.zero_unknown,
-    }
-
-
-def rules_of(model: "Model", plan: StreamPlan) -> Rules:
-    """Return the rules of the fingers of a plan, in its order."""
+def model_config(model: "Model", plan: StreamPlan) -> ModelConfig:
+    """Return the constants of a model: its settings for all fingers, and the rules of a plan's."""
     parts = [model.finger(name, sensor) for name, sensor in plan.sensors.items()]
-    heads: list[Struct] = []
+    heads: list[Row] = []
     numbers = [np.empty(0)]
     for part in parts:
         for name in HEAD_NAMES:
@@ -254,25 +263,43 @@ def rules_of(model: "Model", plan: StreamPlan) -> Rules:
                 }
             )
             numbers += [rows.ravel(), squares.ravel()]
-    return [_contact(part) for part in parts], heads, np.concatenate(numbers)
+    weights, debounce = np.concatenate(numbers), model.debounce
+    settings = {
+        "n_weights": len(weights),
+        "n_model_fingers": model.n_fingers(plan.fingers),
+        "hysteresis": debounce.hysteresis,
+        "min_duration": debounce.min_duration,
+        "hold": debounce.hold,
+        "has_filter": debounce.switching_rate > 0,
+        "switching": debounce.switching_rate,
+        "zero_unknown": plan.zero_unknown,
+    }
+    by_finger = structs("holdfast_head", heads).reshape(len(parts), len(HEAD_NAMES))
+    rules = [_contact(part) | {"heads": own} for part, own in zip(parts, by_finger, strict=True)]
+    return ModelConfig(
+        structs("holdfast_model", [settings]), structs("holdfast_rule", rules), weights
+    )
 
 
-def stable_head(rules: Rules, finger: int) -> Struct:
-    """Return the head of stability of a finger."""
-    return rules[1][finger * len(HEAD_NAMES) + HEAD_NAMES.index("stable")]
+def with_thresholds(rules: Structs, thresholds: Mapping[int, float]) -> Structs:
+    """Return the rules with other thresholds of stability, by the index of the finger."""
+    changed = rules.copy()
+    for finger, threshold in thresholds.items():
+        changed["heads"][finger, HEAD_NAMES.index("stable")]["threshold"] = threshold
+    return changed
 
 
-def _contact(part: "FingerModel") -> Struct:
+def _contact(part: "FingerModel") -> Row:
     # In this order: a model of relative features has a limit by load; and a limit in the unit of
     # the readings, which was measured, is better than a multiple of the noise.
     for kind, limit in (
-        (BY_LOAD, part.contact_load),
-        (BY_FORCE, part.contact_threshold),
-        (BY_NOISE, part.contact_noise),
+        (_extension.CONTACT_BY_LOAD, part.contact_load),
+        (_extension.CONTACT_BY_FORCE, part.contact_threshold),
+        (_extension.CONTACT_BY_NOISE, part.contact_noise),
     ):
         if limit is not None:
             return {"contact": kind, "contact_limit": limit}
-    return {"contact": ALWAYS_CONTACT, "contact_limit": 0.0}
+    return {"contact": _extension.ALWAYS_CONTACT, "contact_limit": 0.0}
 
 
 def _numbers(part: "FingerModel", head: Head | None) -> tuple[Array, Array, list[int]]:
@@ -298,9 +325,3 @@ def _numbers(part: "FingerModel", head: Head | None) -> tuple[Array, Array, list
     if head.classes:
         return rows[kept], squares, [codes[k] for k in kept]
     return rows, squares, []
-
-
-def estimate_rows(n: int, n_fingers: int) -> tuple[npt.NDArray[np.void], Array]:
-    """Return estimates to be filled (n, n_fingers), and the same memory as numbers."""
-    numbers = np.zeros((n, n_fingers, ESTIMATE.itemsize // 8))
-    return numbers.view(ESTIMATE)[..., 0], numbers

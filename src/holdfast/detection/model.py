@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.detection.features import extract
 from holdfast.detection.heads import HEAD_NAMES, Choice, Head, HeadName, Linear
 from holdfast.detection.model_files import decode, encode, read_model, write_model
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import DEFAULT_WINDOW, FeatureSpec
-from holdfast.detection.streams import extract
 from holdfast.errors import ModelError
 from holdfast.recordings import Recording
 from holdfast.resampling import RATE_TOLERANCE

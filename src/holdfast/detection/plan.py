@@ -1,15 +1,17 @@
-"""The plan of a hand: sensors, features, tare and start of its samples."""
+"""The plan of a feature stream: sensors, features, tare and start; samples of recordings for it."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Literal, Self
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, reduce
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.detection.specs import FeatureSpec
-from holdfast.recordings import BASELINES, STARTS_LOADED, Tactile
+from holdfast.recordings import BASELINES, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
@@ -18,6 +20,8 @@ TareArgument = float | str | tuple[float, float]
 
 SEARCH_BLOCK = 1024
 """Samples in which the first finite one is searched at a time."""
+CHUNK_SAMPLES = 2048
+"""Instants that are packed at a time: bounds the memory of offline work."""
 
 
 @dataclass(frozen=True)
@@ -236,6 +240,20 @@ def declared_baselines(
     return baselines
 
 
+class HandSamples(NamedTuple):
+    """Samples of several fingers at successive instants.
+
+    Attributes:
+        times: (n,) [s].
+        present: (n, n_fingers) True for each finger with a sample at that instant.
+        readings: (n, n_taxels, 3) of all fingers, one after the other.
+    """
+
+    times: Array
+    present: Flags
+    readings: Array
+
+
 @dataclass(frozen=True)
 class StreamPlan:
     """Fingers, features, tare and rate of a feature stream.
@@ -247,7 +265,7 @@ class StreamPlan:
         tare: how the baseline is found.
         rate: samples per second [Hz].
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
-        start: with an open hand, or in contact.
+        start: with an open hand, or in contact; for a tare by interval, with its baselines.
     """
 
     sensors: Mapping[str, Sensor]
@@ -283,3 +301,84 @@ class StreamPlan:
         flags = np.ones(self.sensors[finger].n_taxels, dtype=np.bool_)
         flags[list(self.ignore.get(finger, ()))] = False
         return flags
+
+    @cached_property
+    def slices(self) -> dict[str, slice]:
+        """Taxels of each finger in the arrays of all taxels."""
+        ends = np.cumsum([0, *(sensor.n_taxels for sensor in self.sensors.values())]).tolist()
+        return {f: slice(*bounds) for f, bounds in zip(self.fingers, pairwise(ends), strict=True)}
+
+    @property
+    def baseline(self) -> Array:
+        """(n_taxels, 3) readings without contact that are known at the start; 0 for others."""
+        baseline = np.zeros((sum(sensor.n_taxels for sensor in self.sensors.values()), 3))
+        kind = self.used_tare.kind
+        if kind == "interval" or (kind == "none" and self.start.loaded):
+            for finger, own in self.start.baselines.items():
+                baseline[self.slices[finger]] = own
+        return baseline
+
+    def for_recording(self, recording: Recording) -> Self:
+        """Return the plan with the start of a recording, and a tare by interval taken from it.
+
+        Without a module in the recording, a finger has no baseline then.
+
+        Raises:
+            ValueError: a finger has no finite sample in the interval, or the metadata declare a
+                baseline of another shape.
+        """
+        start = Start.of(recording.metadata, self.sensors)
+        if self.tare.kind == "interval":
+            modules = {f: recording.modules[f] for f in self.fingers if f in recording.modules}
+            baselines = {f: self._baseline_of(f, m, recording) for f, m in modules.items()}
+            start = replace(start, baselines=baselines)
+        return replace(self, start=start)
+
+    def _baseline_of(self, finger: str, module: Tactile, recording: Recording) -> Array:
+        rows = slice(*np.searchsorted(module.times, self.tare.interval))
+        readings = np.array(module.readings[rows], dtype=np.float64)
+        # An ignored taxel may be broken: its readings must not make the samples not finite.
+        readings[:, list(self.ignore.get(finger, ()))] = 0.0
+        try:
+            return baseline_of(readings, module.times[rows], self.tare, 1 / self.rate)[0]
+        except ValueError as cause:
+            raise ValueError(
+                f"{finger} of {recording.name!r}, which runs from {recording.start:.15g} to "
+                f"{recording.end:.15g} s: {cause}"
+            ) from cause
+
+    def samples_of(self, recording: Recording) -> Iterator[HandSamples]:
+        """Yield the samples of the plan's fingers in order of time, in chunks.
+
+        Fingers that have a sample at the same time share an instant. A finger that the
+        recording lacks is never present.
+
+        Args:
+            recording: that has at least one of the fingers.
+
+        Yields:
+            At most `CHUNK_SAMPLES` instants at a time.
+        """
+        modules = [
+            (index, taxels, recording.modules[finger])
+            for index, (finger, taxels) in enumerate(self.slices.items())
+            if finger in recording.modules
+        ]
+        # Fingers of one device have the same times, as a rule: no sorting then.
+        times = reduce(
+            lambda times, more: times if np.array_equal(times, more) else np.union1d(times, more),
+            (module.times for _, _, module in modules),
+        )
+        n_taxels = max(taxels.stop for taxels in self.slices.values())
+        for start in range(0, len(times), CHUNK_SAMPLES):
+            chunk = np.ascontiguousarray(times[start : start + CHUNK_SAMPLES])
+            present = np.zeros((len(chunk), len(self.slices)), dtype=np.bool_)
+            readings = np.zeros((len(chunk), n_taxels, 3))
+            for index, taxels, module in modules:
+                # Both ends of the chunk are instants, and no time lies between two instants.
+                first = np.searchsorted(module.times, chunk[0], side="left")
+                last = np.searchsorted(module.times, chunk[-1], side="right")
+                rows = np.searchsorted(chunk, module.times[first:last])
+                present[rows, index] = True
+                readings[rows, taxels] = module.readings[first:last]
+            yield HandSamples(chunk, present, readings)

@@ -15,14 +15,15 @@ from holdfast.contact import (
     Cause,
     ContactEstimate,
     ContactState,
+    Fault,
     HandEstimate,
     Reason,
     faults_of,
     taxels_of,
 )
-from holdfast.detection.model import FingerModel
 from holdfast.errors import require_extras
 from holdfast.kernel import _extension
+from holdfast.kernel.structs import Structs, struct_type
 from holdfast.recordings import Recording
 from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Array, Flags, Integers
@@ -47,20 +48,30 @@ class FingerEstimates(_extension.Estimates, Mapping[str, ContactEstimate]):
         return repr(dict(self))
 
 
-def makers(fingers: Sequence[str], parts: Sequence[FingerModel]) -> tuple[object, ...]:
-    """Return what makes the Python objects of an estimate, in the order of module_detector.c."""
-    places = {finger: place for place, finger in enumerate(fingers)}
-    return (
-        HandEstimate, FingerEstimates, ContactEstimate, STATE_BY_CODE, REASON_BY_CODE,
-        CAUSE_BY_CODE, faults_of, taxels_of, places, _slip_heads(parts),
-    )  # fmt: skip
+class EstimateTypes(NamedTuple):
+    """Objects of which the extension makes estimates; it reads them by these names.
 
+    Attributes:
+        fingers: index of each finger by its name.
+        hand: type of the estimate of a hand.
+        estimates: type of those of its fingers.
+        contact: type of the estimate of a finger.
+        states: by code, as the two that follow.
+        reasons: by code.
+        causes: by code.
+        faults_of: returns the faults of a mask.
+        taxels_of: returns the taxels of a mask.
+    """
 
-def _slip_heads(parts: Sequence[FingerModel]) -> tuple[int, ...]:
-    """Return how many heads of slips each finger has: `slip`, and then `slip_speed`."""
-    return tuple(
-        0 if part.slip is None else 1 if part.head("slip_speed") is None else 2 for part in parts
-    )
+    fingers: Mapping[str, int]
+    hand: type[HandEstimate] = HandEstimate
+    estimates: type[FingerEstimates] = FingerEstimates
+    contact: type[ContactEstimate] = ContactEstimate
+    states: tuple[ContactState, ...] = STATE_BY_CODE
+    reasons: tuple[Reason, ...] = REASON_BY_CODE
+    causes: tuple[Cause | None, ...] = CAUSE_BY_CODE
+    faults_of: Callable[[int], tuple[Fault, ...]] = faults_of
+    taxels_of: Callable[[int], tuple[int, ...]] = taxels_of
 
 
 class FingerTrace(NamedTuple):
@@ -192,7 +203,7 @@ class Chunk(NamedTuple):
     Attributes:
         times: (n,) [s].
         present: (n, n_fingers) True for each finger with a sample at that instant.
-        estimates: (n, n_fingers) of `ESTIMATE` of `detector.tables`.
+        estimates: (n, n_fingers) of `holdfast_finger_estimate`.
         hand: (n,) codes of the hand's state.
     """
 
@@ -202,53 +213,44 @@ class Chunk(NamedTuple):
     hand: Array
 
 
-TRACE_COLUMNS = (
-    ("state", np.int8), ("reason", np.int8), ("probability", np.float64), ("sigma", np.float64),
-    ("force", np.float64), ("faults", np.int32), ("taxels", np.int64), ("cause", np.int8),
-    ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
-)  # fmt: skip
-"""Fields of `ESTIMATE` in the order of `FingerTrace` after its times, and their types there."""
+SPEED_FIELDS = ("slip_speed", "slip_distance")
+SMALL_TYPES = {"state": np.int8, "reason": np.int8, "cause": np.int8, "faults": np.int32}
+"""Types of fields of a trace that have others in `holdfast_finger_estimate`."""
 
 
 def detection_of(
-    recording: Recording,
-    fingers: Sequence[str],
-    parts: Sequence[FingerModel],
-    chunks: Iterable[Chunk],
+    recording: Recording, fingers: Sequence[str], rules: Structs, chunks: Iterable[Chunk]
 ) -> Detection:
     """Join the chunks of a recording, each of which is needed only until the next.
 
     Args:
         recording: of which all samples are in the chunks.
         fingers: in the order of the columns.
-        parts: models of the fingers.
+        rules: (n_fingers,) of `holdfast_rule`: without a head, its columns are None.
         chunks: at least one, in order of time.
     """
     # The traces are allocated once, as the number of samples of each finger is known.
+    kind, traces = struct_type("holdfast_finger_estimate"), dict[str, FingerTrace]()
+    for finger, (_, slip, speed, _) in zip(fingers, rules["heads"]["n_outputs"], strict=True):
+        n = recording.modules[finger].n_samples if finger in recording.modules else 0
+        if n:
+            columns: dict[str, npt.NDArray[Any]] = {
+                name: np.empty((n, *kind[name].shape), SMALL_TYPES.get(name, kind[name].base))
+                for name in FingerTrace._fields[1:]
+                if (slip or name != "slip_probability") and (speed or name not in SPEED_FIELDS)
+            }
+            traces[finger] = FingerTrace(recording.modules[finger].times, **columns)
     times, hand = list[Array](), list[npt.NDArray[np.int8]]()
-    found = {}
-    for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True):
-        if finger in recording.modules and recording.modules[finger].n_samples:
-            n = recording.modules[finger].n_samples
-            # Missing are slip, speed and distance without a head of slips, the last two without
-            # `slip_speed`.
-            n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
-            columns: list[npt.NDArray[Any]] = [
-                np.empty((n, 3) if field == "force" else n, number)
-                for field, number in TRACE_COLUMNS[:n_columns]
-            ]
-            found[finger] = FingerTrace(recording.modules[finger].times, *columns)
-    ends = dict.fromkeys(found, 0)  # rows of each finger that are filled
+    ends = dict.fromkeys(traces, 0)  # rows of each finger that are filled
     for chunk in chunks:
         times.append(chunk.times)
         hand.append(chunk.hand.astype(np.int8))
-        for place, finger in enumerate(fingers):
-            rows = chunk.estimates[chunk.present[:, place], place]
-            if not len(rows):
-                continue
-            part = slice(ends[finger], ends[finger] + len(rows))
-            ends[finger] = part.stop
-            for column, (field, _) in zip(found[finger][1:], TRACE_COLUMNS, strict=True):
-                if column is not None:
-                    column[part] = rows[field]
-    return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))
+        for index, finger in enumerate(fingers):
+            rows = chunk.estimates[chunk.present[:, index], index]
+            if len(rows):
+                part = slice(ends[finger], ends[finger] + len(rows))
+                ends[finger] = part.stop
+                for name, column in traces[finger]._asdict().items():
+                    if column is not None and name != "times":
+                        column[part] = rows[name]
+    return Detection(recording.name, traces, np.concatenate(times), np.concatenate(hand))

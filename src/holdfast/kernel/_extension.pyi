@@ -1,6 +1,6 @@
 """Functions in C. Those of arrays release the GIL, and refuse all but contiguous float64."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import msgspec
 import numpy as np
@@ -37,6 +37,18 @@ def parse_counts(text: bytes | msgspec.Raw, integers: bytes | msgspec.Raw, /) ->
 
 LANES: int
 """Partial sums of a sum over taxels; arrays of taxels are padded to a multiple of it."""
+N_COMPONENTS: int
+"""Values with a Haar window: F_a, and the components of F_tip."""
+ALWAYS_CONTACT: int
+CONTACT_BY_FORCE: int
+CONTACT_BY_NOISE: int
+CONTACT_BY_LOAD: int
+GAP_LIMIT_PERIODS: float
+"""A step in time of more sample periods is a gap."""
+MAX_BRIDGED_SECONDS: float
+"""Longest gap that windows in seconds bridge [s]."""
+MAX_DEVIATION: float
+"""Squares are of values of at most this many standard deviations."""
 
 def logistic(values: npt.NDArray[np.float64], /) -> None:
     """Replace log odds (n,) by probabilities, with the bits of the detector."""
@@ -57,18 +69,9 @@ class Stream:
     A call while another thread is inside one raises RuntimeError.
     """
 
-    def __new__(
-        cls,
-        hand: dict[str, object],
-        fingers: list[dict[str, object]],
-        features: list[dict[str, object]],
-        lags: list[dict[str, object]],
-        used: npt.NDArray[np.float64],
-        rotations: npt.NDArray[np.float64],
-        places: npt.NDArray[np.float64],
-        baseline: npt.NDArray[np.float64],
-        /,
-    ) -> Stream: ...
+    def __new__(cls, *arguments: bytes) -> Stream:
+        """Return the stream of the bytes of a `StreamConfig`, and of a baseline (n_taxels, 3)."""
+
     def advance(
         self,
         readings: npt.NDArray[np.float64],
@@ -93,18 +96,14 @@ class Detector:
     A call while another thread is inside one raises RuntimeError.
     """
 
-    def __new__(
-        cls,
-        stream: tuple[object, ...],
-        model: dict[str, object],
-        rules: list[dict[str, object]],
-        heads: list[dict[str, object]],
-        weights: npt.NDArray[np.float64],
-        makers: tuple[object, ...],
-        array_type: type,
-        note: Callable[[tuple[float, bytes, bytes]], None],
-        /,
-    ) -> Detector: ...
+    def __new__(cls, *arguments: object) -> Detector:
+        """Return the detector of the eight arguments of a `Stream`, and of six others.
+
+        They are the bytes of `holdfast_model`, of the rules and of the weights; an object with the
+        names of `EstimateTypes`; `numpy.ndarray`; and what is called with (time, states before,
+        states after) at each change.
+        """
+
     def update(self, samples: object, time: float, /) -> HandEstimate | None:
         """Return the estimate; None for samples or a time that Python converts or refuses."""
 
@@ -122,15 +121,9 @@ class Detector:
         hand: npt.NDArray[np.float64],
         /,
     ) -> None:
-        """Process n samples. Fill (n, n_fingers, 12) C structs and (n,) states of the hand."""
+        """Process n samples; fill (n, n_fingers) structs, as float64, and (n,) hand states."""
 
-    def set_rules(
-        self,
-        rules: list[dict[str, object]],
-        heads: list[dict[str, object]],
-        weights: npt.NDArray[np.float64],
-        /,
-    ) -> None:
+    def set_rules(self, rules: bytes, weights: bytes, /) -> None:
         """Change rules and heads from the next sample on."""
 
     def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:

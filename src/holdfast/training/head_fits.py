@@ -8,7 +8,8 @@ import numpy.typing as npt
 
 from holdfast.contact import CAUSES, Cause
 from holdfast.detection import ANY_FINGER, FeatureSpec, Head, Model
-from holdfast.detection.heads import MAX_DEVIATION, Linear
+from holdfast.detection.heads import Linear
+from holdfast.kernel._extension import MAX_DEVIATION
 from holdfast.sensors.types import Array
 from holdfast.training.classifiers.fitting import Samples, standardise
 from holdfast.training.classifiers.logreg import LogisticRegression

@@ -12,7 +12,7 @@ import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
 from holdfast.detection import ANY_FINGER, Debounce, FingerTrace, Model, detect
-from holdfast.detection.streams import extract
+from holdfast.detection.features import extract
 from holdfast.errors import TrainingError
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs

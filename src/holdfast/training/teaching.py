@@ -16,9 +16,9 @@ import msgspec
 import numpy as np
 
 from holdfast.detection import ANY_FINGER, Head, Model, Training
+from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import TAUGHT_FEATURES
-from holdfast.detection.streams import extract
 from holdfast.errors import TrainingError
 from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLDS,

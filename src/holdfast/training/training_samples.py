@@ -9,9 +9,8 @@ import numpy as np
 
 from holdfast.contact import NO_CONTACT, UNKNOWN
 from holdfast.detection import ANY_FINGER, FeatureSpec, HeadName, Tare
-from holdfast.detection.features import rest_amplitude
+from holdfast.detection.features import extract, rest_amplitude
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.streams import extract
 from holdfast.metrics.slip_truth import slip_truth
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states

@@ -21,8 +21,8 @@ from holdfast.detection import (
     detect,
 )
 from holdfast.detection.detector import MAX_EVENTS
+from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.streams import extract
 from holdfast.errors import ModelError, StreamError
 from holdfast.sensors import sensor as built_in
 

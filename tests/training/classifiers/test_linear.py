@@ -5,8 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.detection import Linear
-from holdfast.detection.heads import MAX_DEVIATION
 from holdfast.errors import ModelError
+from holdfast.kernel._extension import MAX_DEVIATION
 
 numbers = st.floats(-1e3, 1e3)
 positive = st.floats(1e-2, 1e3)

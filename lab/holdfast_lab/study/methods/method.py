@@ -16,7 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.detection import Tare
 from holdfast.detection.features import tared_force
-from holdfast.detection.kernel_config import GAP_LIMIT_PERIODS
+from holdfast.kernel._extension import GAP_LIMIT_PERIODS
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from holdfast.detection import ANY_FINGER, DEFAULT_WINDOW, Model
+from holdfast.detection.features import extract
 from holdfast.detection.heads import Linear
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import FeatureSpec
-from holdfast.detection.streams import extract
 from holdfast.sensors.types import Array
 from holdfast.training.classifiers import Parameters, Samples
 from holdfast.training.classifiers.fitting import Fitted
