@@ -36,10 +36,8 @@ def with_causes(**options):
 def made_kernel(plan, note):
     """A detector of the extension that calls `note` at each change of state."""
     config = *packed(stream_config(plan)), plan.baseline.tobytes()
-    types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)})
-    return _extension.Detector(
-        *config, *packed(model_config(with_causes(), plan)), types, np.ndarray, note
-    )
+    types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)}, note)
+    return _extension.Detector(*config, *packed(model_config(with_causes(), plan)), types)
 
 
 class TestEstimates:

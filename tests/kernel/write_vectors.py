@@ -116,10 +116,9 @@ def estimates_of(used, plan, rows):
     config = *packed(stream_config(plan)), plan.baseline.tobytes()
     features = np.empty((*present.shape, plan.width))
     _extension.Stream(*config).advance(readings, present, times, features, np.empty(present.shape))
-    types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)})
-    kernel = _extension.Detector(
-        *config, *packed(model_config(used, plan)), types, np.ndarray, lambda change: None
-    )
+    indices = {name: index for index, name in enumerate(plan.fingers)}
+    types = EstimateTypes(indices, lambda change: None)
+    kernel = _extension.Detector(*config, *packed(model_config(used, plan)), types)
     estimates = np.zeros(present.shape, struct_type("holdfast_finger_estimate"))
     hand = np.empty(len(times))
     kernel.run(readings, present, times, estimates.view(np.float64), hand)

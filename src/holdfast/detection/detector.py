@@ -133,11 +133,11 @@ class Detector:
         # `events` turns them into events, so that an update makes no Python objects for them.
         self._transitions: deque[tuple[float, bytes, bytes]] = deque(maxlen=MAX_EVENTS)
         plan = self._plan
+        indices = {finger: index for index, finger in enumerate(plan.fingers)}
         self._kernel = _extension.Detector(
             *packed(stream_config(plan)), plan.baseline.tobytes(), self._settings.tobytes(),
             self._rules.tobytes(), self._weights.tobytes(),
-            EstimateTypes({finger: index for index, finger in enumerate(plan.fingers)}), ndarray,
-            self._transitions.append,
+            EstimateTypes(indices, self._transitions.append),
         )  # fmt: skip
 
     def __getstate__(self) -> object:

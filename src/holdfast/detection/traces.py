@@ -49,10 +49,11 @@ class FingerEstimates(_extension.Estimates, Mapping[str, ContactEstimate]):
 
 
 class EstimateTypes(NamedTuple):
-    """Objects of which the extension makes estimates; it reads them by these names.
+    """Objects that the extension uses; it reads them by these names.
 
     Attributes:
         fingers: index of each finger by its name.
+        note: is called with (time, states before, states after) at each change of state.
         hand: type of the estimate of a hand.
         estimates: type of those of its fingers.
         contact: type of the estimate of a finger.
@@ -61,9 +62,11 @@ class EstimateTypes(NamedTuple):
         causes: by code.
         faults_of: returns the faults of a mask.
         taxels_of: returns the taxels of a mask.
+        array_type: of the samples that it reads without Python.
     """
 
     fingers: Mapping[str, int]
+    note: Callable[[tuple[float, bytes, bytes]], None]
     hand: type[HandEstimate] = HandEstimate
     estimates: type[FingerEstimates] = FingerEstimates
     contact: type[ContactEstimate] = ContactEstimate
@@ -72,6 +75,7 @@ class EstimateTypes(NamedTuple):
     causes: tuple[Cause | None, ...] = CAUSE_BY_CODE
     faults_of: Callable[[int], tuple[Fault, ...]] = faults_of
     taxels_of: Callable[[int], tuple[int, ...]] = taxels_of
+    array_type: type[np.ndarray[Any, Any]] = np.ndarray
 
 
 class FingerTrace(NamedTuple):

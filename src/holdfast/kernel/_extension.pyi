@@ -13,10 +13,10 @@ SOURCES: str
 
 def haar_features(
     force: npt.NDArray[np.float64],
-    window: int,
+    out: npt.NDArray[np.float64],
     first: int,
     stop: int,
-    out: npt.NDArray[np.float64],
+    window: int,
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 6) with the features of a force (n, 3)."""
@@ -25,9 +25,9 @@ def fingertip_force(
     readings: npt.NDArray[np.float64],
     baseline: npt.NDArray[np.float64],
     rotations: npt.NDArray[np.float64],
+    out: npt.NDArray[np.float64],
     first: int,
     stop: int,
-    out: npt.NDArray[np.float64],
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 3) with the force of readings (n, n_taxels, 3)."""
@@ -97,11 +97,9 @@ class Detector:
     """
 
     def __new__(cls, *arguments: object) -> Detector:
-        """Return the detector of the eight arguments of a `Stream`, and of six others.
+        """Return the detector of the eight arguments of a `Stream`, and of four others.
 
-        They are the bytes of `holdfast_model`, of the rules and of the weights; an object with the
-        names of `EstimateTypes`; `numpy.ndarray`; and what is called with (time, states before,
-        states after) at each change.
+        They are the bytes of a `ModelConfig`, and an object with the names of `EstimateTypes`.
         """
 
     def update(self, samples: object, time: float, /) -> HandEstimate | None:
@@ -126,7 +124,7 @@ class Detector:
     def set_rules(self, rules: bytes, weights: bytes, /) -> None:
         """Change rules and heads from the next sample on."""
 
-    def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:
+    def baselines(self, out: npt.NDArray[np.float64], /) -> tuple[bool, ...]:
         """Fill (n_taxels, 3) with the tare, and return whether that of each finger is complete."""
 
     def last_time(self) -> float:

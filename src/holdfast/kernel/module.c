@@ -21,18 +21,32 @@
 /* The size of the scratch memory of a longer window, ten rows of doubles, could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
 
-/* Return 0 if the last n_out of n arrays share no memory with others, else set an exception. */
-static int check_apart(const array *arrays, size_t n, size_t n_out)
+/* Axes of the arrays that a function takes. Lengths below 0 are those of the first such array. */
+enum { N = 1, FINGERS, TAXELS, FEATURES, COLUMNS, AXES, MATRIX_ROWS, N_AXES };
+#define LENGTHS(...)                                                                               \
+    {                                                                                              \
+        [N] = -1, [AXES] = 3, [MATRIX_ROWS] = 3, __VA_ARGS__                                       \
+    }
+enum { MAX_ARRAYS = 5 };
+
+/* What a function expects of an argument that is an array. */
+typedef struct {
+    char type; /* see get_array */
+    bool is_out;
+    const char *name;
+    int axes[3]; /* 0 from the last one on */
+} parameter;
+
+/* Return 0 if array i shares no memory with those before it, else set an exception. */
+static int check_apart(const array *arrays, size_t i)
 {
-    for (size_t i = n - n_out; i < n; ++i) {
-        const char *const out = arrays[i].view.buf;
-        for (size_t j = 0; j < i; ++j) {
-            const char *const other = arrays[j].view.buf;
-            if (other + arrays[j].view.len > out && out + arrays[i].view.len > other) {
-                PyErr_Format(
-                    PyExc_ValueError, "%s and %s share memory", arrays[j].name, arrays[i].name);
-                return -1;
-            }
+    const char *const out = arrays[i].view.buf;
+    for (size_t j = 0; j < i; ++j) {
+        const char *const other = arrays[j].view.buf;
+        if (other + arrays[j].view.len > out && out + arrays[i].view.len > other) {
+            PyErr_Format(
+                PyExc_ValueError, "%s and %s share memory", arrays[j].name, arrays[i].name);
+            return -1;
         }
     }
     return 0;
@@ -45,6 +59,40 @@ static int check_count(Py_ssize_t n_args, Py_ssize_t expected)
     }
     PyErr_Format(PyExc_TypeError, "%zd arguments expected, %zd given", expected, n_args);
     return -1;
+}
+
+/* Take the arrays of all arguments, which fit each other, or set an exception and return -1.
+ *
+ * Arrays that are written stand last, and share no memory with others. */
+static int read_arrays(
+    PyObject *const *args, Py_ssize_t n_args, const parameter *expected, size_t n,
+    Py_ssize_t *lengths, array *arrays)
+{
+    if (check_count(n_args, (Py_ssize_t)n) < 0) {
+        return -1;
+    }
+    for (size_t i = 0; i < n; ++i) {
+        const int *const axes = expected[i].axes;
+        const int n_axes = !axes[1] ? 1 : !axes[2] ? 2 : 3;
+        const int flags = expected[i].is_out ? PyBUF_WRITABLE : PyBUF_SIMPLE;
+        if (get_array(expected[i].type, args[i], expected[i].name, n_axes, flags, &arrays[i]) < 0) {
+            return -1;
+        }
+    }
+    for (size_t i = 0; i < n; ++i) {
+        Py_ssize_t shape[3];
+        for (int axis = 0; axis < arrays[i].view.ndim; ++axis) {
+            Py_ssize_t *const length = &lengths[expected[i].axes[axis]];
+            shape[axis] = *length = *length < 0 ? arrays[i].view.shape[axis] : *length;
+        }
+        if (check_shape(&arrays[i], shape) < 0) {
+            return -1;
+        }
+        if (expected[i].is_out && check_apart(arrays, i) < 0) {
+            return -1;
+        }
+    }
+    return 0;
 }
 
 #include "module_batch.c"
@@ -84,7 +132,8 @@ typedef struct {
     bool *present;    /* (n_fingers) of one sample */
     size_t n_taxels;  /* of all fingers */
     double last_time; /* of the newest sample [s] */
-    bool is_in_use;   /* a call without the GIL is running */
+    bool is_in_use;   /* a call is running */
+    const char *noun; /* in messages */
 } stream;
 
 /* Allocate zeros that live as long as the stream; NULL with an exception. */
@@ -134,7 +183,7 @@ static int refuse_config(const char *wrong)
 }
 
 /* Take the constants of a stream and its baseline, begin it, or set an exception and return -1. */
-static int begin_stream(stream *s, PyObject *const *args)
+static int begin_stream(stream *s, PyObject *const *args, const char *noun)
 {
     holdfast_hand *const h = &s->hand;
     const void *const hand = from_bytes(args[0], "hand", 1, sizeof *h);
@@ -173,6 +222,7 @@ static int begin_stream(stream *s, PyObject *const *args)
     holdfast_place(h, &s->memory, block);
     holdfast_begin(h, &s->memory, baseline);
     s->last_time = -INFINITY;
+    s->noun = noun;
     return 0;
 }
 
@@ -200,7 +250,7 @@ static PyObject *stream_new(PyTypeObject *type, PyObject *args, PyObject *names)
         return NULL;
     }
     stream *const s = (stream *)PyType_GenericAlloc(type, 0); /* all bytes are 0 */
-    if (s != NULL && begin_stream(s, items) < 0) {
+    if (s != NULL && begin_stream(s, items, "stream") < 0) {
         Py_DECREF(s);
         return NULL;
     }
@@ -261,64 +311,69 @@ static int check_times(const array *times, double last)
     return 0;
 }
 
+/* Let a stream be used by this call alone, or set an exception and return -1: what its arguments
+ * run, or another thread while the GIL is released, may call it. */
+static int begin_use(stream *s)
+{
+    if (s->is_in_use) {
+        PyErr_Format(PyExc_RuntimeError, "another thread is using this %s", s->noun);
+        return -1;
+    }
+    s->is_in_use = true;
+    return 0;
+}
+
+/* advance(readings, present, times, features, amplitude): process n samples. */
 static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
 {
+    static const parameter expected[] = {
+        {'d', false, "readings", {N, TAXELS, AXES}},
+        {'?', false, "present", {N, FINGERS}},
+        {'d', false, "times", {N}},
+        {'d', true, "features", {N, FINGERS, FEATURES}},
+        {'d', true, "amplitude", {N, FINGERS}},
+    };
     stream *const s = (stream *)self;
-    if (check_count(n_args, 5) < 0) {
+    if (begin_use(s) < 0) {
         return NULL;
     }
-    if (s->is_in_use) {
-        PyErr_SetString(PyExc_RuntimeError, "another thread is using this stream");
-        return NULL;
-    }
-    s->is_in_use = true; /* before an object that is no array may run Python */
-    array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
-    array *const times = &arrays[2], *const features = &arrays[3], *const amplitude = &arrays[4];
+    Py_ssize_t lengths[N_AXES] = LENGTHS(
+        [FINGERS] = (Py_ssize_t)s->hand.n_fingers, [TAXELS] = (Py_ssize_t)s->n_taxels,
+        [FEATURES] = (Py_ssize_t)s->hand.n_features);
+    array arrays[MAX_ARRAYS] = {0}, *const times = &arrays[2];
     PyObject *result = NULL;
-    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
-        get_array('d', args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
-        get_array('d', args[3], "features", 3, PyBUF_WRITABLE, features) < 0 ||
-        get_array('d', args[4], "amplitude", 2, PyBUF_WRITABLE, amplitude) < 0) {
-        goto done;
+    if (read_arrays(args, n_args, expected, 5, lengths, arrays) == 0 &&
+        check_times(times, s->last_time) == 0) {
+        s->last_time = lengths[N] > 0 ? times->data[lengths[N] - 1] : s->last_time;
+        /* To release the GIL takes longer than a sample. */
+        PyThreadState *const released = lengths[N] > 1 ? PyEval_SaveThread() : NULL;
+        advance_all(s, &arrays[0], &arrays[1], times, &arrays[3], &arrays[4]);
+        if (released != NULL) {
+            PyEval_RestoreThread(released);
+        }
+        result = Py_NewRef(Py_None);
     }
-    const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->hand.n_fingers;
-    const Py_ssize_t n_taxels = (Py_ssize_t)s->n_taxels;
-    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
-        check_shape(present, SHAPE(n, n_fingers)) < 0 ||
-        check_shape(features, SHAPE(n, n_fingers, (Py_ssize_t)s->hand.n_features)) < 0 ||
-        check_shape(amplitude, SHAPE(n, n_fingers)) < 0 || check_apart(arrays, 5, 2) < 0 ||
-        check_times(times, s->last_time) < 0) {
-        goto done;
-    }
-    if (n > 0) {
-        s->last_time = times->data[n - 1];
-    }
-    /* To release the GIL takes longer than a sample. */
-    PyThreadState *const released = n > 1 ? PyEval_SaveThread() : NULL;
-    advance_all(s, readings, present, times, features, amplitude);
-    if (released != NULL) {
-        PyEval_RestoreThread(released);
-    }
-    result = Py_NewRef(Py_None);
-done:
-    release(arrays, 5);
+    release(arrays, MAX_ARRAYS);
     s->is_in_use = false;
     return result;
 }
 
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
+#define METHOD(name, function)                                                                     \
+    {                                                                                              \
+#name, (PyCFunction)(void (*)(void))(function), METH_FASTCALL, NULL                        \
+    }
 static PyMethodDef functions[] = {
-    {"haar_features", (PyCFunction)(void (*)(void))haar_features, METH_FASTCALL, NULL},
-    {"fingertip_force", (PyCFunction)(void (*)(void))fingertip_force, METH_FASTCALL, NULL},
-    {"logistic", (PyCFunction)(void (*)(void))logistic, METH_FASTCALL, NULL},
-    {"replay", (PyCFunction)(void (*)(void))replay, METH_FASTCALL, NULL},
+    METHOD(haar_features, haar_features),
+    METHOD(fingertip_force, fingertip_force),
+    METHOD(logistic, logistic),
+    METHOD(replay, replay),
     {"parse_counts", (PyCFunction)(void (*)(void))parse_counts, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 
 static PyMethodDef stream_methods[] = {
-    {"advance", (PyCFunction)(void (*)(void))stream_advance, METH_FASTCALL, NULL},
+    METHOD(advance, stream_advance),
     {NULL, NULL, 0, NULL},
 };
 

@@ -4,38 +4,25 @@
  * the hand. It keeps the GIL; `Detector.run` releases it. An estimate of a hand holds a copy of the
  * C structs of its fingers; the Python object of a finger is made when it is read. */
 
-/* Python objects that a detector uses. It reads them by these names, but the last two. */
-typedef struct {
-    PyObject *fingers;   /* dictionary: index of each finger by its name */
-    PyObject *hand;      /* type of the estimate of a hand */
-    PyObject *estimates; /* type of those of its fingers, a subclass of Estimates */
-    PyObject *contact;   /* type of the estimate of a finger */
-    PyObject *states;    /* tuples, by code */
-    PyObject *reasons;
-    PyObject *causes;
-    PyObject *faults_of; /* functions of a mask */
-    PyObject *taxels_of;
-    PyObject *array_type; /* numpy.ndarray */
-    PyObject *note;       /* is called with (time, states before, states after) at a change */
-} python_objects;
-
-static const struct {
-    const char *name;
-    size_t offset;
-} object_names[] = {
-    {"fingers", offsetof(python_objects, fingers)},
-    {"hand", offsetof(python_objects, hand)},
-    {"estimates", offsetof(python_objects, estimates)},
-    {"contact", offsetof(python_objects, contact)},
-    {"states", offsetof(python_objects, states)},
-    {"reasons", offsetof(python_objects, reasons)},
-    {"causes", offsetof(python_objects, causes)},
-    {"faults_of", offsetof(python_objects, faults_of)},
-    {"taxels_of", offsetof(python_objects, taxels_of)},
-    {NULL, offsetof(python_objects, array_type)},
-    {NULL, offsetof(python_objects, note)},
+/* Python objects that a detector uses, which it reads by these names. */
+enum {
+    FINGER_INDICES, /* dictionary: index of each finger by its name */
+    HAND_TYPE,      /* of the estimate of a hand */
+    ESTIMATES_TYPE, /* of those of its fingers: a subclass of Estimates */
+    CONTACT_TYPE,   /* of the estimate of a finger */
+    STATES,         /* tuples, by code */
+    REASONS,
+    CAUSES,
+    FAULTS_OF, /* functions of a mask */
+    TAXELS_OF,
+    ARRAY_TYPE, /* numpy.ndarray */
+    NOTE,       /* is called with (time, states before, states after) at a change */
+    N_OBJECTS
 };
-enum { N_OBJECTS = sizeof object_names / sizeof *object_names };
+static const char *const object_names[N_OBJECTS] = {
+    "fingers", "hand",      "estimates", "contact",    "states", "reasons",
+    "causes",  "faults_of", "taxels_of", "array_type", "note",
+};
 
 /* A detector of a hand. It begins with a stream, whose constants and memory it uses. */
 typedef struct {
@@ -48,7 +35,7 @@ typedef struct {
     holdfast_finger_estimate *estimates; /* (n_fingers) */
     char *before;                        /* (n_fingers + 1) states of fingers and hand */
     char *after;
-    python_objects python;
+    PyObject *objects[N_OBJECTS];
 } detector;
 
 /* Estimates of the fingers of a hand at one instant, by name. */
@@ -57,25 +44,18 @@ typedef struct {
     holdfast_finger_estimate fingers[1];
 } estimates;
 
-static PyObject **object_at(detector *s, size_t i)
-{
-    return (PyObject **)((char *)&s->python + object_names[i].offset);
-}
-
 /* Take the objects of an argument, or set an exception and return -1. */
-static int read_objects(detector *s, PyObject *names, PyObject *array_type, PyObject *note)
+static int read_objects(detector *s, PyObject *argument)
 {
-    s->python.array_type = Py_NewRef(array_type);
-    s->python.note = Py_NewRef(note);
-    for (size_t i = 0; object_names[i].name != NULL; ++i) {
-        *object_at(s, i) = PyObject_GetAttrString(names, object_names[i].name);
-        if (*object_at(s, i) == NULL) {
+    for (size_t i = 0; i < N_OBJECTS; ++i) {
+        s->objects[i] = PyObject_GetAttrString(argument, object_names[i]);
+        if (s->objects[i] == NULL) {
             return -1;
         }
     }
-    const python_objects *const p = &s->python;
-    if (!PyDict_Check(p->fingers) || !PyTuple_Check(p->states) || !PyTuple_Check(p->reasons) ||
-        !PyTuple_Check(p->causes) || PyDict_Size(p->fingers) != (Py_ssize_t)s->base.hand.n_fingers) {
+    if (!PyDict_Check(s->objects[FINGER_INDICES]) || !PyTuple_Check(s->objects[STATES]) ||
+        !PyTuple_Check(s->objects[REASONS]) || !PyTuple_Check(s->objects[CAUSES]) ||
+        PyDict_Size(s->objects[FINGER_INDICES]) != (Py_ssize_t)s->base.hand.n_fingers) {
         PyErr_SetString(PyExc_ValueError, "objects of an estimate of these fingers expected");
         return -1;
     }
@@ -100,12 +80,12 @@ static int set_rules(detector *s, PyObject *rules, PyObject *weights)
     return 0;
 }
 
-/* Detector(the eight of a stream, model, rules, weights, objects, ndarray, note) */
+/* Detector(the eight of a stream, model, rules, weights, objects) */
 static PyObject *detector_new(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-    enum { N = N_STREAM_PARTS };
-    PyObject *items[N + 6];
-    if (read_arguments(args, names, N + 6, items) == NULL) {
+    enum { FIRST = N_STREAM_PARTS };
+    PyObject *items[FIRST + 4];
+    if (read_arguments(args, names, FIRST + 4, items) == NULL) {
         return NULL;
     }
     detector *const s = (detector *)PyType_GenericAlloc(type, 0); /* all bytes are 0 */
@@ -113,8 +93,8 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *args, PyObject *name
         return NULL;
     }
     const void *model = NULL;
-    if (begin_stream(&s->base, items) < 0 ||
-        !(model = from_bytes(items[N], "model", 1, sizeof s->model))) {
+    if (begin_stream(&s->base, items, "detector") < 0 ||
+        !(model = from_bytes(items[FIRST], "model", 1, sizeof s->model))) {
         goto failed;
     }
     memcpy(&s->model, model, sizeof s->model);
@@ -125,8 +105,8 @@ static PyObject *detector_new(PyTypeObject *type, PyObject *args, PyObject *name
         goto failed;
     }
     const size_t n = s->base.hand.n_fingers;
-    if (set_rules(s, items[N + 1], items[N + 2]) < 0 ||
-        read_objects(s, items[N + 3], items[N + 4], items[N + 5]) < 0 ||
+    if (set_rules(s, items[FIRST + 1], items[FIRST + 2]) < 0 ||
+        read_objects(s, items[FIRST + 3]) < 0 ||
         !(s->readings = allocate(&s->base, 3 * s->base.n_taxels, sizeof(double))) ||
         !(s->estimates = allocate(&s->base, n, sizeof *s->estimates)) ||
         !(s->d.decisions = allocate(&s->base, n, sizeof *s->d.decisions)) ||
@@ -146,7 +126,7 @@ static int detector_traverse(PyObject *self, visitproc visit, void *arg)
 {
     Py_VISIT(Py_TYPE(self));
     for (size_t i = 0; i < N_OBJECTS; ++i) {
-        Py_VISIT(*object_at((detector *)self, i));
+        Py_VISIT(((detector *)self)->objects[i]);
     }
     return 0;
 }
@@ -154,7 +134,7 @@ static int detector_traverse(PyObject *self, visitproc visit, void *arg)
 static int detector_clear(PyObject *self)
 {
     /* What can be part of a cycle; the methods of a detector that is cleared are not called. */
-    Py_CLEAR(((detector *)self)->python.note);
+    Py_CLEAR(((detector *)self)->objects[NOTE]);
     return 0;
 }
 
@@ -164,7 +144,7 @@ static void detector_dealloc(PyObject *self)
     PyTypeObject *const type = Py_TYPE(self);
     PyObject_GC_UnTrack(self);
     for (size_t i = 0; i < N_OBJECTS; ++i) {
-        Py_CLEAR(*object_at(s, i));
+        Py_XDECREF(s->objects[i]);
     }
     Py_XDECREF(s->rules);
     Py_XDECREF(s->weights);
@@ -191,21 +171,21 @@ static PyObject *number_of(const holdfast_head *head, double value)
 static PyObject *make_finger(const estimates *e, size_t i)
 {
     enum { N = 12 };
-    const python_objects *const p = &e->detector->python;
+    PyObject *const *const objects = e->detector->objects;
     const holdfast_head *const heads = e->detector->model.rules[i].heads;
     const holdfast_head *const slip = &heads[HOLDFAST_HEAD_SLIP];
     const holdfast_head *const speed = &heads[HOLDFAST_HEAD_SPEED];
     const holdfast_finger_estimate *const f = &e->fingers[i];
     PyObject *const fields[N] = {
         PyFloat_FromDouble(f->time),
-        Py_XNewRef(PyTuple_GetItem(p->states, f->state)),
-        Py_XNewRef(PyTuple_GetItem(p->reasons, f->reason)),
+        Py_XNewRef(PyTuple_GetItem(objects[STATES], f->state)),
+        Py_XNewRef(PyTuple_GetItem(objects[REASONS], f->reason)),
         PyFloat_FromDouble(f->stable_probability),
         PyFloat_FromDouble(f->instability),
         Py_BuildValue("(ddd)", f->force[0], f->force[1], f->force[2]),
-        f->faults ? from_mask(p->faults_of, f->faults) : PyTuple_New(0),
-        f->faults ? from_mask(p->taxels_of, f->faulty_taxels) : PyTuple_New(0),
-        Py_XNewRef(PyTuple_GetItem(p->causes, f->cause)),
+        f->faults ? from_mask(objects[FAULTS_OF], f->faults) : PyTuple_New(0),
+        f->faults ? from_mask(objects[TAXELS_OF], f->faulty_taxels) : PyTuple_New(0),
+        Py_XNewRef(PyTuple_GetItem(objects[CAUSES], f->cause)),
         number_of(slip, f->slip_probability),
         number_of(speed, f->slip_speed),
         number_of(speed, f->slip_distance),
@@ -217,7 +197,7 @@ static PyObject *make_finger(const estimates *e, size_t i)
     }
     if (n_made == N) {
         result = PyObject_CallFunctionObjArgs(
-            p->contact, fields[0], fields[1], fields[2], fields[3], fields[4], fields[5],
+            objects[CONTACT_TYPE], fields[0], fields[1], fields[2], fields[3], fields[4], fields[5],
             fields[6], fields[7], fields[8], fields[9], fields[10], fields[11], NULL);
     }
     for (int k = 0; k < N; ++k) {
@@ -230,7 +210,7 @@ static PyObject *estimates_get(PyObject *self, PyObject *name)
 {
     const estimates *const e = (estimates *)self;
     PyObject *const index = /* borrowed */
-        e->detector ? PyDict_GetItemWithError(e->detector->python.fingers, name) : NULL;
+        e->detector ? PyDict_GetItemWithError(e->detector->objects[FINGER_INDICES], name) : NULL;
     if (index == NULL) {
         if (!PyErr_Occurred()) {
             PyErr_SetObject(PyExc_KeyError, name);
@@ -247,13 +227,13 @@ static PyObject *estimates_get(PyObject *self, PyObject *name)
 static Py_ssize_t estimates_length(PyObject *self)
 {
     const estimates *const e = (estimates *)self;
-    return e->detector ? PyDict_Size(e->detector->python.fingers) : 0;
+    return e->detector ? PyDict_Size(e->detector->objects[FINGER_INDICES]) : 0;
 }
 
 static PyObject *estimates_iter(PyObject *self)
 {
     const estimates *const e = (estimates *)self;
-    return e->detector ? PyObject_GetIter(e->detector->python.fingers) : PyErr_NoMemory();
+    return e->detector ? PyObject_GetIter(e->detector->objects[FINGER_INDICES]) : PyErr_NoMemory();
 }
 
 static int estimates_traverse(PyObject *self, visitproc visit, void *arg)
@@ -286,18 +266,15 @@ static PyType_Spec estimates_spec = {
     estimates_slots,
 };
 
-/* Call a method, unless a call of the detector runs: what its arguments run, or another thread
- * while the GIL is released, may call it. */
+/* Call a method of a detector that no other call uses. */
 static PyObject *call_locked(
     PyObject *self, PyObject *const *args, Py_ssize_t n_args,
     PyObject *(*method)(detector *, PyObject *const *, Py_ssize_t))
 {
     detector *const s = (detector *)self;
-    if (s->base.is_in_use) {
-        PyErr_SetString(PyExc_RuntimeError, "another thread is using this detector");
+    if (begin_use(&s->base) < 0) {
         return NULL;
     }
-    s->base.is_in_use = true;
     PyObject *const result = method(s, args, n_args);
     s->base.is_in_use = false;
     return result;
@@ -309,7 +286,7 @@ static PyObject *call_locked(
 static bool copy_sample(const detector *s, PyObject *object, const holdfast_finger *finger)
 {
     Py_buffer view;
-    if ((PyObject *)Py_TYPE(object) != s->python.array_type) {
+    if ((PyObject *)Py_TYPE(object) != s->objects[ARRAY_TYPE]) {
         return false;
     }
     if (PyObject_GetBuffer(object, &view, PyBUF_C_CONTIGUOUS | PyBUF_FORMAT) < 0) {
@@ -346,7 +323,7 @@ static bool copy_samples(detector *s, PyObject *samples)
     if (!PyDict_CheckExact(samples)) {
         return false;
     }
-    while (PyDict_Next(s->python.fingers, &position, &name, &index_object)) {
+    while (PyDict_Next(s->objects[FINGER_INDICES], &position, &name, &index_object)) {
         PyObject *const sample = PyDict_GetItemWithError(samples, name); /* borrowed */
         if (sample == NULL && PyErr_Occurred()) {
             PyErr_Clear();
@@ -376,14 +353,14 @@ static void copy_states(const detector *s, char *states)
 static PyObject *make_hand(detector *s, double time)
 {
     const size_t n = s->base.hand.n_fingers;
-    PyTypeObject *const type = (PyTypeObject *)s->python.estimates;
+    PyTypeObject *const type = (PyTypeObject *)s->objects[ESTIMATES_TYPE];
     estimates *const e = (estimates *)PyType_GenericAlloc(type, (Py_ssize_t)n);
     PyObject *const when = PyFloat_FromDouble(time);
-    PyObject *const state = PyTuple_GetItem(s->python.states, s->d.state), *result = NULL;
+    PyObject *const state = PyTuple_GetItem(s->objects[STATES], s->d.state), *result = NULL;
     if (e != NULL && when != NULL && state != NULL) {
         e->detector = (detector *)Py_NewRef((PyObject *)s);
         memcpy(e->fingers, s->estimates, n * sizeof *s->estimates);
-        result = PyObject_CallFunctionObjArgs(s->python.hand, when, state, e, NULL);
+        result = PyObject_CallFunctionObjArgs(s->objects[HAND_TYPE], when, state, e, NULL);
     }
     Py_XDECREF((PyObject *)e);
     Py_XDECREF(when);
@@ -399,7 +376,7 @@ static int note_change(const detector *s, double time, const char *before, const
     }
     PyObject *const change = Py_BuildValue("(dy#y#)", time, before, n, after, n);
     PyObject *const done =
-        change ? PyObject_CallFunctionObjArgs(s->python.note, change, NULL) : NULL;
+        change ? PyObject_CallFunctionObjArgs(s->objects[NOTE], change, NULL) : NULL;
     Py_XDECREF(change);
     Py_XDECREF(done);
     return done ? 0 : -1;
@@ -442,28 +419,24 @@ static PyObject *update_locked(detector *s, PyObject *const *args, Py_ssize_t n_
 /* step(readings, present, time): the estimate of a sample that Python has converted. */
 static PyObject *step_locked(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 3) < 0) {
-        return NULL;
-    }
-    const double time = PyFloat_AsDouble(args[2]);
-    array arrays[2] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
+    static const parameter expected[] = {
+        {'d', false, "readings", {TAXELS, AXES}}, {'?', false, "present", {FINGERS}}};
+    Py_ssize_t lengths[N_AXES] = LENGTHS(
+        [FINGERS] = (Py_ssize_t)s->base.hand.n_fingers, [TAXELS] = (Py_ssize_t)s->base.n_taxels);
+    array arrays[2] = {0};
     PyObject *result = NULL;
-    if (PyErr_Occurred() || get_array('d', args[0], "readings", 2, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('?', args[1], "present", 1, PyBUF_SIMPLE, present) < 0 ||
-        check_shape(readings, SHAPE((Py_ssize_t)s->base.n_taxels, 3)) < 0 ||
-        check_shape(present, SHAPE((Py_ssize_t)s->base.hand.n_fingers)) < 0) {
-        goto done;
+    if (check_count(n_args, 3) == 0 && read_arrays(args, 2, expected, 2, lengths, arrays) == 0) {
+        const double time = PyFloat_AsDouble(args[2]);
+        const unsigned char *const is_present = arrays[1].view.buf;
+        for (size_t f = 0; f < s->base.hand.n_fingers; ++f) {
+            s->base.present[f] = is_present[f] != 0;
+        }
+        if (time > s->base.last_time && time <= DBL_MAX) {
+            result = process(s, arrays[0].data, time);
+        } else if (!PyErr_Occurred()) {
+            PyErr_SetString(PyExc_ValueError, "a finite time later than the one before expected");
+        }
     }
-    if (!(time > s->base.last_time && time <= DBL_MAX)) {
-        PyErr_SetString(PyExc_ValueError, "a finite time later than the one before expected");
-        goto done;
-    }
-    const unsigned char *const is_present = present->view.buf;
-    for (size_t f = 0; f < s->base.hand.n_fingers; ++f) {
-        s->base.present[f] = is_present[f] != 0;
-    }
-    result = process(s, readings->data, time);
-done:
     release(arrays, 2);
     return result;
 }
@@ -508,39 +481,29 @@ static int note_changes(detector *s, const array *times, const array *out, const
 /* run(readings, present, times, estimates, hand): as `update`, of n samples. */
 static PyObject *run_locked(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 5) < 0) {
-        return NULL;
-    }
-    array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
-    array *const times = &arrays[2], *const out = &arrays[3], *const hand = &arrays[4];
+    static const parameter expected[] = {
+        {'d', false, "readings", {N, TAXELS, AXES}},
+        {'?', false, "present", {N, FINGERS}},
+        {'d', false, "times", {N}}, /* structs of all fingers, as doubles: aligned */
+        {'d', true, "estimates", {N, COLUMNS}},
+        {'d', true, "hand", {N}},
+    };
+    const size_t n_fingers = s->base.hand.n_fingers;
+    Py_ssize_t lengths[N_AXES] = LENGTHS(
+        [FINGERS] = (Py_ssize_t)n_fingers, [TAXELS] = (Py_ssize_t)s->base.n_taxels,
+        [COLUMNS] = (Py_ssize_t)(n_fingers * sizeof *s->estimates / sizeof(double)));
+    array a[MAX_ARRAYS] = {0}, *const times = &a[2], *const out = &a[3], *const hand = &a[4];
     PyObject *result = NULL;
-    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
-        get_array('d', args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
-        /* (n, n_fingers times the size of a struct in doubles): its bytes, aligned */
-        get_array('d', args[3], "estimates", 2, PyBUF_WRITABLE, out) < 0 ||
-        get_array('d', args[4], "hand", 1, PyBUF_WRITABLE, hand) < 0) {
-        goto done;
+    if (read_arrays(args, n_args, expected, MAX_ARRAYS, lengths, a) == 0 &&
+        check_times(times, s->base.last_time) == 0) {
+        s->base.last_time = lengths[N] > 0 ? times->data[lengths[N] - 1] : s->base.last_time;
+        copy_states(s, s->before);
+        Py_BEGIN_ALLOW_THREADS
+        run_all(s, &a[0], &a[1], times, out, hand);
+        Py_END_ALLOW_THREADS
+        result = note_changes(s, times, out, hand) < 0 ? NULL : Py_NewRef(Py_None);
     }
-    const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->base.hand.n_fingers;
-    const Py_ssize_t n_taxels = (Py_ssize_t)s->base.n_taxels;
-    const Py_ssize_t n_doubles = (Py_ssize_t)(sizeof(holdfast_finger_estimate) / sizeof(double));
-    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
-        check_shape(present, SHAPE(n, n_fingers)) < 0 ||
-        check_shape(out, SHAPE(n, n_fingers * n_doubles)) < 0 || check_shape(hand, SHAPE(n)) < 0 ||
-        check_apart(arrays, 5, 2) < 0 || check_times(times, s->base.last_time) < 0) {
-        goto done;
-    }
-    if (n > 0) {
-        s->base.last_time = times->data[n - 1];
-    }
-    copy_states(s, s->before);
-    Py_BEGIN_ALLOW_THREADS
-    run_all(s, readings, present, times, out, hand);
-    Py_END_ALLOW_THREADS
-    result = note_changes(s, times, out, hand) < 0 ? NULL : Py_NewRef(Py_None);
-done:
-    release(arrays, 5);
+    release(a, MAX_ARRAYS);
     return result;
 }
 
@@ -556,25 +519,20 @@ static PyObject *set_rules_locked(detector *s, PyObject *const *args, Py_ssize_t
 /* baselines(out): fill (n_taxels, 3) and return for each finger whether its tare is complete. */
 static PyObject *baselines_locked(detector *s, PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 1) < 0) {
-        return NULL;
-    }
+    static const parameter expected[] = {{'d', true, "out", {TAXELS, AXES}}};
+    Py_ssize_t lengths[N_AXES] = LENGTHS([TAXELS] = (Py_ssize_t)s->base.n_taxels);
+    const holdfast_hand *const hand = &s->base.hand;
     array out = {0};
     PyObject *result = NULL;
-    const holdfast_hand *const hand = &s->base.hand;
-    if (get_array('d', args[0], "out", 2, PyBUF_WRITABLE, &out) == 0 &&
-        check_shape(&out, SHAPE((Py_ssize_t)s->base.n_taxels, 3)) == 0) {
-        result = PyList_New((Py_ssize_t)hand->n_fingers);
+    if (read_arrays(args, n_args, expected, 1, lengths, &out) == 0) {
+        result = PyTuple_New((Py_ssize_t)hand->n_fingers);
     }
     for (size_t i = 0; result != NULL && i < hand->n_fingers; ++i) {
-        const holdfast_finger *const finger = &hand->fingers[i];
         const bool is_tared =
-            holdfast_baseline(&s->model, &s->d, i, out.data + 3 * finger->first_taxel);
-        if (PyList_SetItem(result, (Py_ssize_t)i, PyBool_FromLong(is_tared)) < 0) {
-            Py_CLEAR(result);
-        }
+            holdfast_baseline(&s->model, &s->d, i, out.data + 3 * hand->fingers[i].first_taxel);
+        PyTuple_SetItem(result, (Py_ssize_t)i, PyBool_FromLong(is_tared)); /* cannot fail */
     }
-    PyBuffer_Release(&out.view);
+    release(&out, 1);
     return result;
 }
 
@@ -586,10 +544,10 @@ static PyObject *detector_last_time(PyObject *self, PyObject *const *args, Py_ss
                                       : PyFloat_FromDouble(((detector *)self)->base.last_time);
 }
 
-#define LOCKED(name)                                                                                \
+#define LOCKED(name)                                                                               \
     static PyObject *detector_##name(PyObject *self, PyObject *const *args, Py_ssize_t n_args)     \
     {                                                                                              \
-        return call_locked(self, args, n_args, name##_locked);                                       \
+        return call_locked(self, args, n_args, name##_locked);                                     \
     }
 LOCKED(update)
 LOCKED(step)
@@ -597,14 +555,14 @@ LOCKED(run)
 LOCKED(set_rules)
 LOCKED(baselines)
 
-#define METHOD(name)                                                                               \
-    {                                                                                              \
-#name, (PyCFunction)(void (*)(void))detector_##name, METH_FASTCALL, NULL                   \
-    }
-
 static PyMethodDef detector_methods[] = {
-    METHOD(update),    METHOD(step),      METHOD(run),           METHOD(set_rules),
-    METHOD(baselines), METHOD(last_time), {NULL, NULL, 0, NULL},
+    METHOD(update, detector_update),
+    METHOD(step, detector_step),
+    METHOD(run, detector_run),
+    METHOD(set_rules, detector_set_rules),
+    METHOD(baselines, detector_baselines),
+    METHOD(last_time, detector_last_time),
+    {NULL, NULL, 0, NULL},
 };
 
 static PyType_Slot detector_slots[] = {
@@ -614,9 +572,6 @@ static PyType_Slot detector_slots[] = {
 };
 
 static PyType_Spec detector_spec = {
-    "holdfast.kernel._extension.Detector",
-    sizeof(detector),
-    0,
-    Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC,
-    detector_slots,
+    "holdfast.kernel._extension.Detector",   sizeof(detector), 0,
+    Py_TPFLAGS_DEFAULT | Py_TPFLAGS_HAVE_GC, detector_slots,
 };
