@@ -177,7 +177,7 @@ class Guide:
                 self._slides = throw_away(self._path, int(thrown[1]))
             except ValueError as refusal:
                 screen.print(str(refusal))
-            self._judge("", screen)
+            self._report_grasp("", screen)
         elif text in ("next", "repeat", "skip", "quit"):
             n_results = len(protocol.results)
             self._follow(protocol.press(text), screen)
@@ -236,9 +236,9 @@ class Guide:
     def _show_result(self, checked: Checked, screen: TeachScreen) -> None:
         self._checking = None
         self._slides, note = checked
-        self._judge(note, screen)
+        self._report_grasp(note, screen)
 
-    def _judge(self, note: str, screen: TeachScreen) -> None:
+    def _report_grasp(self, note: str, screen: TeachScreen) -> None:
         protocol, slides = self.protocol, self._slides
         n_slides = None if slides is None else len(slides)
         protocol.checked(self._path.stem, self._seconds, n_slides, note)

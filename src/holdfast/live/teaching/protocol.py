@@ -228,7 +228,7 @@ class GuidedProtocol:
     def checked(
         self, recording: str, seconds: float, n_slides: int | None = None, note: str = ""
     ) -> None:
-        """Judge the grasp whose recording is complete.
+        """Accept or refuse the grasp whose recording is complete.
 
         Args:
             recording: its name.
@@ -237,7 +237,7 @@ class GuidedProtocol:
             note: why it is not known.
         """
         self._recording, self._seconds, self._n_slides = recording, seconds, n_slides or 0
-        self.passed, self.message = self._judge(n_slides, note)
+        self.passed, self.message = self._check_grasp(n_slides, note)
         self.stage = Stage.DECIDE
 
     def view(self) -> View:
@@ -373,11 +373,11 @@ class GuidedProtocol:
                 changes.append(float(np.percentile(change, 95)) / usual)
         return max(changes)
 
-    def _judge(self, n_slides: int | None, note: str) -> tuple[bool, str]:
+    def _check_grasp(self, n_slides: int | None, note: str) -> tuple[bool, str]:
         """Return whether the grasp was what the step asks for, and the result in one line."""
         step = self.step
         if step.check is Check.HEALTH:
-            return self._judge_health()
+            return self._check_health()
         if self._held < MIN_HELD_SHARE * step.seconds:
             return False, f"held for {self._held:.0f} s only, {step.seconds:.0f} s expected"
         good, bad = f"held for {self._held:.0f} s", ""
@@ -406,7 +406,7 @@ class GuidedProtocol:
                     bad = f"{seen}: {step.name} a little farther"
         return not bad, bad or good
 
-    def _judge_health(self) -> tuple[bool, str]:
+    def _check_health(self) -> tuple[bool, str]:
         modules: dict[str, ModuleHealth] = {}
         try:
             for name, samples in self._samples.items():

@@ -107,7 +107,7 @@ class TestTwoSpeeds:
         (wish,) = [wanted(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 4)][-1:]
         assert wish.reason is GripReason.UNSTABLE and wish.scale > before + 0.8
 
-    def test_a_grip_that_was_never_stable_is_judged_by_what_it_adds(self):
+    def test_a_grip_that_was_never_stable_is_evaluated_by_what_it_adds(self):
         law, one = self.calm(probability=0.1)
         wishes = [wanted(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 90)]
         assert max(wish.scale for wish in wishes) <= one.scale
