@@ -39,7 +39,7 @@ LOG_TWO_SOURCE = (
 )
 LOG_HAND_SOURCE = (
     "no paper: log F_a and log sigma of the finger at N_w = 14, and the largest log sigma of all "
-    "fingers, so that a finger is classified by the whole hand too; logistic regression with balanced "
+    "fingers, so that a finger is judged by the whole hand too; logistic regression with balanced "
     "classes"
 )
 ENERGY_SOURCE = (

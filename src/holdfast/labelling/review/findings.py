@@ -170,7 +170,7 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
     if not low <= rate <= high:
         yield "rate", f"{rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
     if module.sensor.n_taxels == 1:
-        yield "one_taxel", "one taxel: taxels cannot be compared, only its force is used"
+        yield "one_taxel", "one taxel: taxels cannot be compared, only its force is judged"
     still = [axis for axis, is_still in zip(AXES, module.still, strict=True) if is_still]
     if len(still) == len(AXES):
         yield "dead", "the readings never change: the sensor is dead or disconnected"
