@@ -16,10 +16,10 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_tables import recordings_of_arrays
+from holdfast.io.importers.array_conversion import recordings_of_arrays
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import first_texts
-from holdfast.io.importers.table_recordings import ANY_MODULE
+from holdfast.io.importers.table_conversion import ANY_MODULE
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import overload
 
 from holdfast.errors import RecordingError
-from holdfast.io.recording_files import SUFFIXES, is_recording, load_recording
+from holdfast.io.file_formats import SUFFIXES, is_recording, load_recording
 from holdfast.recordings import Recording
 
 

@@ -17,7 +17,7 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_tables import in_memory, recordings_of_arrays
+from holdfast.io.importers.array_conversion import in_memory, recordings_of_arrays
 from holdfast.io.importers.arrays import arrays_of_columns
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import natural_order

@@ -18,7 +18,7 @@ from holdfast.errors import HoldfastError, SourceError, TrainingError
 from holdfast.labelling.taught_grasps import Slide, label_grasp, throw_away, write_pictures
 from holdfast.live.camera import CameraRecorder
 from holdfast.live.recorder import Recorder
-from holdfast.live.source_recording import create_recorder
+from holdfast.live.recorder_setup import create_recorder
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import TARE_SECONDS, GuidedProtocol, Stage

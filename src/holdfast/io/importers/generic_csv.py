@@ -22,7 +22,7 @@ from holdfast.io.importers.table import (
     read_head,
     read_table,
 )
-from holdfast.io.importers.table_recordings import (
+from holdfast.io.importers.table_conversion import (
     DEFAULT_MODULE,
     TIME,
     Report,

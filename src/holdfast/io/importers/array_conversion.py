@@ -29,7 +29,7 @@ from holdfast.io.importers.csv_columns import (
     guessed_time,
 )
 from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
-from holdfast.io.importers.table_recordings import (
+from holdfast.io.importers.table_conversion import (
     ANY_MODULE,
     MAX_MODULES,
     Report,
