@@ -32,7 +32,7 @@ LOKY_WARNING = "A worker stopped while some jobs were given"
 
 
 class Engine(NamedTuple):
-    """Place where calls are made: this process, processes of this machine, or a Dask cluster.
+    """Where calls are made: this process, processes of this machine, or a Dask cluster.
 
     Attributes:
         n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made

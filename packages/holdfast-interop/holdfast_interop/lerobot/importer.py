@@ -171,11 +171,11 @@ def read_episodes(path: Path) -> Iterator[_Episode]:
             )
         for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
             for row in batch.to_pylist():
-                place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
+                index = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
                 yield _Episode(
                     int(row["episode_index"]),
                     int(row["length"]),
-                    path / DATA_PATH.format(**place),
+                    path / DATA_PATH.format(**index),
                     decode_header(row[HEADER_COLUMN], path),
                     msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
                 )

@@ -124,7 +124,7 @@ class Guide:
                 raise TrainingError(f"stopped in step {protocol.step.name}")
         except HoldfastError as failure:
             n, path = len(self._folder.kept), self._folder.path
-            rest = f"{n} of {protocol.n_places} grasps are in {path}: go on with --resume"
+            rest = f"{n} of {protocol.n_grasps} grasps are in {path}: go on with --resume"
             raise type(failure)(f"{failure}; {rest}") from failure
 
     def _step(self, screen: TeachScreen, keys: MarkerKeys) -> None:
@@ -151,9 +151,9 @@ class Guide:
             self._recorder.close()  # it raises what failed
         if self._source.ended and protocol.stage not in WAITING_STAGES:
             raise SourceError(f"{self._source.name} ended in step {protocol.step.name}")
-        place = f"{len(self._folder.kept)} of {protocol.n_places} grasps"
+        progress = f"{len(self._folder.kept)} of {protocol.n_grasps} grasps"
         if protocol.stage is not Stage.OVER:
-            screen.show(protocol.view(), place)
+            screen.show(protocol.view(), progress)
 
     def _ask(self, twin: AskedTwin, screen: TeachScreen) -> None:
         """Ask the twin for the grasp that begins, or for another one if it has failed."""

@@ -155,15 +155,15 @@ class GuidedProtocol:
         self.message, self.n_begun = "", 0
         self._sensors, self._steps = sensors, steps
         over = {(result.name, result.number) for result in done if result.is_done}
-        places = [(step, k) for step in steps for k in range(1, step.n_grasps + 1)]
+        grasps = [(step, k) for step in steps for k in range(1, step.n_grasps + 1)]
         # Those that are left, the next one last.
-        self._left = [place for place in reversed(places) if (place[0].name, place[1]) not in over]
+        self._left = [grasp for grasp in reversed(grasps) if (grasp[0].name, grasp[1]) not in over]
         self._now = self._began = math.nan  # of the newest estimate, and of the stage
         self._since = math.nan  # since when what the stage waits for lasts
         self._touching: tuple[str, ...] = ()
         self._grips: dict[str, float] = {}  # mean force of each finger when it held last
         self._recording, self._seconds, self._n_slides = "", 0.0, 0
-        self.step, self.number = places[-1]
+        self.step, self.number = grasps[-1]
         self.stage = Stage.OVER
         self._begin()
 
@@ -173,7 +173,7 @@ class GuidedProtocol:
         return self.stage in RECORDED_STAGES
 
     @property
-    def n_places(self) -> int:
+    def n_grasps(self) -> int:
         """Number of grasps of the whole protocol."""
         return sum(step.n_grasps for step in self._steps)
 
