@@ -111,14 +111,14 @@ def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
             print(f"{name}, {kind}: state {header.state_size}, constants {header.constants_size}, "
                   f"code {code_size(header)} bytes; {symbols(header.text)}")  # fmt: skip
             for compiler in filter(shutil.which, ("gcc", "clang")):
-                place = folder / f"{name.split(':')[-1]}-{kind}-{compiler}"
-                place.mkdir()
-                (place / "model.h").write_text(header.text)
-                (place / "main.c").write_text(MAIN)
+                build = folder / f"{name.split(':')[-1]}-{kind}-{compiler}"
+                build.mkdir()
+                (build / "model.h").write_text(header.text)
+                (build / "main.c").write_text(MAIN)
                 words = ["-std=c99", "-O2", "-ffp-contract=off", f"-DBLOCK={BLOCK}"]
-                files = [place / "main.c", "-o", place / "run", "-lm"]
+                files = [build / "main.c", "-o", build / "run", "-lm"]
                 subprocess.run([compiler, *words, *files], check=True)
-                made[name, f"{compiler} -O2 {kind}"] = place / "run"
+                made[name, f"{compiler} -O2 {kind}"] = build / "run"
     return made
 
 

@@ -85,9 +85,9 @@ def decisions(folder):
     paths = sorted((folder / "main").glob("*.parquet"))[:2]
     for model in MODELS:
         for path in paths:
-            place = path.relative_to(folder)
-            lines = holdfast("detect", model, place, "--json", cwd=folder, check=False)
-            yield f"detect/{model}/{place}", digest(lines)
+            name = path.relative_to(folder)
+            lines = holdfast("detect", model, name, "--json", cwd=folder, check=False)
+            yield f"detect/{model}/{name}", digest(lines)
         yield (
             f"evaluate/{model}",
             document(holdfast("evaluate", model, "main", "--json", cwd=folder)),

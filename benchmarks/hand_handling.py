@@ -109,11 +109,11 @@ def read_grasp(
 def moments_of_others(grasps: Sequence[HandGrasp]) -> list[Moments | None]:
     """Return the own handling of each grasp, from the other grasps of its hand; None without."""
     by_hand: dict[str, list[int]] = {}
-    for place, grasp in enumerate(grasps):
-        by_hand.setdefault(grasp.hand, []).append(place)
+    for index, grasp in enumerate(grasps):
+        by_hand.setdefault(grasp.hand, []).append(index)
     moments: list[Moments | None] = []
-    for place, grasp in enumerate(grasps):
-        others = [grasps[k].handling for k in by_hand[grasp.hand] if k != place]
+    for index, grasp in enumerate(grasps):
+        others = [grasps[k].handling for k in by_hand[grasp.hand] if k != index]
         handling = np.concatenate(others) if others else np.empty((0, grasp.features.shape[1]))
         moments.append(location_and_scale(handling) if len(handling) >= MIN_SAMPLES else None)
     return moments
@@ -153,5 +153,5 @@ def moments_by(name: str, grasps: Sequence[HandGrasp]) -> list[Moments | None]:
 def folds_of(grasps: Sequence[HandGrasp], n_folds: int) -> np.ndarray:
     """Return the fold of each grasp; all grasps of a hand are in one."""
     hands = list(dict.fromkeys(grasp.hand for grasp in grasps))
-    by_hand: Mapping[str, int] = {hand: place % n_folds for place, hand in enumerate(hands)}
+    by_hand: Mapping[str, int] = {hand: index % n_folds for index, hand in enumerate(hands)}
     return np.array([by_hand[grasp.hand] for grasp in grasps])

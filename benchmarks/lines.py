@@ -36,11 +36,11 @@ def main() -> None:
     parser.add_argument("--at", help="commit to compare with")
     parser.add_argument("--rooms", action="store_true", help="count each folder, not each group")
     options = parser.parse_args()
-    place = room_of if options.rooms else group_of
-    now, before = counts(ROOT, place), Counter[str]()
+    group = room_of if options.rooms else group_of
+    now, before = counts(ROOT, group), Counter[str]()
     if options.at:
         with tempfile.TemporaryDirectory() as folder:
-            before = counts(checkout(options.at, Path(folder)), place)
+            before = counts(checkout(options.at, Path(folder)), group)
     rows = sorted({*now, *before}, key=lambda row: (row.startswith(" "), row))
     for row in rows if options.rooms else sorted(rows, key=order):
         past = f"{before[row]:>9,}" if options.at else ""
@@ -51,8 +51,8 @@ def order(row: str) -> tuple[int, str]:
     return (GROUPS.index(row) if row in GROUPS else len(GROUPS), row)
 
 
-def counts(root: Path, place) -> Counter[str]:
-    """Return the code lines of each place, and rows of all else that is said about a checkout."""
+def counts(root: Path, group) -> Counter[str]:
+    """Return the code lines of each group, and rows of all else that is said about a checkout."""
     rows: Counter[str] = Counter()
     for name in tracked(root):
         path = root / name
@@ -63,7 +63,7 @@ def counts(root: Path, place) -> Counter[str]:
         if VENDORED.search(name) or path.suffix in DATA:
             rows[f" kB vendored or data: {PurePosixPath(name).parent}"] += path.stat().st_size >> 10
         elif (code := code_lines(kind, text)) is not None:
-            rows[place(name)] += code
+            rows[group(name)] += code
             rows[" code lines without tests"] += code * (group_of(name) != "tests")
             rows[" # fmt: skip"] += text.count("# fmt: skip")
     return rows

@@ -159,9 +159,9 @@ class Figures:
         for row in found:
             head = tuple(str(row.get(key, "")) for key in lines)
             name = str(row[column])
-            places = (digits_of or {}).get(name, digits)
+            n_digits = (digits_of or {}).get(name, digits)
             kept = row if intervals is None or name in intervals else {**row, "interval": None}
-            cells.setdefault(head, {}).setdefault(name, _cell_text(kept, places))
+            cells.setdefault(head, {}).setdefault(name, _cell_text(kept, n_digits))
         table_lines = [[*lines, *names], ["---"] * len(lines) + ["--:"] * len(names)]
         table_lines += [
             [*head, *(by_column.get(each, MISSING) for each in names)]

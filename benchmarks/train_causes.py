@@ -107,9 +107,9 @@ def print_confusion(model: Model, samples: Sequence[UnstableSamples], folds: Int
         weights, names = head.rule.raw_weights(), np.array(head.classes)
         for k in np.flatnonzero(folds == fold):
             scores = samples[k].features @ weights[:, 1:].T + weights[:, 0]
-            places = (np.searchsorted(CAUSES, samples[k].causes),)
-            places += (np.searchsorted(CAUSES, names[scores.argmax(axis=1)]),)
-            np.add.at(counts, places, 1)
+            cells = (np.searchsorted(CAUSES, samples[k].causes),)
+            cells += (np.searchsorted(CAUSES, names[scores.argmax(axis=1)]),)
+            np.add.at(counts, cells, 1)
     print(f"| cause | samples | {' | '.join(CAUSES)} |\n|---|---|{'---|' * len(CAUSES)}")
     for cause, row in zip(CAUSES, counts, strict=True):
         shares = " | ".join(f"{100 * n / max(row.sum(), 1):.0f}" for n in row)

@@ -137,8 +137,8 @@ def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> n
     names = [str(unit) for unit in plan.data_split.group_of]
     if plan.scan.relative:
         names = [str(item.metadata.get("hand", item.name)) for item in recordings]
-    places = {name: place for place, name in enumerate(dict.fromkeys(names))}
-    return np.array([places[name] % N_FOLDS for name in names])
+    indices = {name: index for index, name in enumerate(dict.fromkeys(names))}
+    return np.array([indices[name] % N_FOLDS for name in names])
 
 
 def normalised_samples(
@@ -191,7 +191,7 @@ def print_folder(
     folder: str,
     recordings: Sequence[Recording],
     curves: Sequence[Mapping[str, SlipCurve]],
-    place: int,
+    index: int,
 ) -> None:
     """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
     own = [
@@ -200,7 +200,7 @@ def print_folder(
         if fingers and item.name.startswith(f"{folder}/")
     ]
     print(folder)
-    print_metrics(slip_metrics(SlipCurve.total(own)[place]))
+    print_metrics(slip_metrics(SlipCurve.total(own)[index]))
 
 
 def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCurve]:

@@ -21,7 +21,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from holdfast.recorded import BOX_SLIPS
+from holdfast.demo_data import BOX_SLIPS
 
 OUT = Path(__file__).parents[1] / "docs" / "img" / "live.webp"
 DURATION = 9.6

@@ -205,7 +205,7 @@ def _relinked(link: str, page: Path, source: str) -> str:
 
 
 def _target(path: Path) -> str:
-    """Return the place in the site of a file that is outside `docs/`."""
+    """Return the path in the site of a file that is outside `docs/`."""
     if path == ROOT / "README.md":
         return "index.md"
     name = path.relative_to(ROOT).as_posix()

@@ -181,9 +181,9 @@ def flipped():
         chance = random.Random(seed)
         for k in range(n):
             near = [chance.randrange(64), len(raw) - 1 - chance.randrange(min(4000, len(raw)))]
-            place = chance.randrange(len(raw)) if k % 2 else chance.choice(near)
+            offset = chance.randrange(len(raw)) if k % 2 else chance.choice(near)
             damaged = bytearray(raw)
-            damaged[place] ^= 1 << chance.randrange(8)
-            yield place, bytes(damaged)
+            damaged[offset] ^= 1 << chance.randrange(8)
+            yield offset, bytes(damaged)
 
     return copies

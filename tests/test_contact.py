@@ -125,8 +125,8 @@ def test_bits_are_taxels(taxels):
 
 @given(st.sets(st.sampled_from(Fault)))
 def test_bits_are_faults(faults):
-    places = list(Fault)
-    found = faults_of(sum(1 << places.index(fault) for fault in faults))
+    order = list(Fault)
+    found = faults_of(sum(1 << order.index(fault) for fault in faults))
     assert found == tuple(fault for fault in Fault if fault in faults)
 
 

@@ -29,27 +29,27 @@ def power(base, exponent):
     return base**exponent, os.getpid()
 
 
-def total(place, array):
+def total(index, array):
     time.sleep(0.02)
-    return place + float(array.sum())
+    return index + float(array.sum())
 
 
-def die_once(place, folder):
+def die_once(index, folder):
     """Kill the process at every fourth call, the first time that it is made."""
     time.sleep(0.02)
     try:
-        (folder / str(place)).touch(exist_ok=False)
+        (folder / str(index)).touch(exist_ok=False)
     except FileExistsError:
-        return place, "again"
-    if place % 4 == 1:
+        return index, "again"
+    if index % 4 == 1:
         os.kill(os.getpid(), signal.SIGKILL)
-    return place, "at once"
+    return index, "at once"
 
 
-def die_at(place, deadly):
-    if place == deadly:
+def die_at(index, deadly):
+    if index == deadly:
         os.kill(os.getpid(), signal.SIGKILL)
-    return place
+    return index
 
 
 def joined(*parts):
@@ -69,7 +69,7 @@ ENDLESS = """
 import os, sys, time
 from holdfast.parallel import Engine
 
-def work(place):
+def work(index):
     print(os.getpid(), flush=True)
     time.sleep(100)
 
@@ -198,12 +198,12 @@ class TestEngine:
 
 class TestProcesses:
     def test_calls_of_a_process_that_died_are_made_again(self, tmp_path):
-        done = list(PROCESSES.map_ordered(die_once, [(place, tmp_path) for place in range(8)]))
-        assert [place for place, _ in done] == list(range(8))
-        assert [done[place][1] for place in (1, 5)] == ["again", "again"]
+        done = list(PROCESSES.map_ordered(die_once, [(index, tmp_path) for index in range(8)]))
+        assert [index for index, _ in done] == list(range(8))
+        assert [done[index][1] for index in (1, 5)] == ["again", "again"]
 
     def test_a_call_that_always_kills_is_named(self):
-        calls = [(f"call {place}", (place, 4)) for place in range(8)]
+        calls = [(f"call {index}", (index, 4)) for index in range(8)]
         done = []
         with pytest.raises(EngineError, match="call 4"):
             done.extend(result for _, result in PROCESSES.map_unordered(die_at, calls))
@@ -211,7 +211,7 @@ class TestProcesses:
 
 class TestCluster:
     def test_a_killed_worker_loses_no_result(self, cluster):
-        arguments = [(place, np.full(10_000, float(place))) for place in range(60)]
+        arguments = [(index, np.full(10_000, float(index))) for index in range(60)]
         results = []
         for result in engine_of(cluster).map_ordered(total, arguments):
             results.append(result)
@@ -224,7 +224,7 @@ class TestCluster:
             list(engine_of(cluster).map_ordered(power, [(1, 1), (1, -1)]))
 
     def test_a_call_that_always_kills_is_named(self):
-        calls = [(place, 2) for place in range(6)]
+        calls = [(index, 2) for index in range(6)]
         with (
             two_workers(**{"distributed.scheduler.allowed-failures": 0}) as cluster,
             pytest.raises(EngineError, match="2: its worker"),

@@ -135,7 +135,7 @@ class Double(Law):
     def start(self, touches, thumb):
         """Do nothing."""
 
-    def wishes(self, touches, time, dt):
+    def targets(self, touches, time, dt):
         """Return twice the force for each finger."""
         return [(2.0, GripReason.NONE) for touch in touches]
 '''
@@ -152,7 +152,7 @@ def test_add_a_grip_law(copy_of):
     )  # fmt: skip
     program = (
         "from holdfast_grip.laws import law_named, Touch\n"
-        "print(law_named('double').wishes([Touch('thumb')], 0.0, 0.01)[0][0])"
+        "print(law_named('double').targets([Touch('thumb')], 0.0, 0.01)[0][0])"
     )
     assert copy.run("-c", program) == "2.0\n"
 

@@ -24,9 +24,9 @@ class Figure(msgspec.Struct, frozen=True):
     parts: list[float]
 
 
-def figure(place, seed):
+def figure(k, seed):
     """What a task of the study may look like: random numbers by key, a Struct of NumPy numbers."""
-    parts = np.random.default_rng([place, seed]).normal(size=3)
+    parts = np.random.default_rng([k, seed]).normal(size=3)
     return Figure(parts.sum(), parts)
 
 
@@ -35,28 +35,28 @@ def n_threads():
     return [max_threads(), *(info["num_threads"] for info in threadpool_info())]
 
 
-def noted(place, folder):
+def noted(k, folder):
     """Leaves one byte for each time that it is called."""
-    with (Path(folder) / str(place)).open("ab") as file:
+    with (Path(folder) / str(k)).open("ab") as file:
         file.write(b"x")
     time.sleep(0.05)
-    return place
+    return k
 
 
-def fail(place):
-    if place == 2:
+def fail(k):
+    if k == 2:
         raise ValueError("no good")
-    if place == 3:
+    if k == 3:
         raise OSError(28, "No space left on device")
-    return place
+    return k
 
 
 def tasks(n=8):
-    return [Task(f"figure/{place}", figure, (place, 7), Figure) for place in range(n)]
+    return [Task(f"figure/{k}", figure, (k, 7), Figure) for k in range(n)]
 
 
 def noted_tasks(folder, n=12):
-    return [Task(f"noted/{place}", noted, (place, str(folder)), int) for place in range(n)]
+    return [Task(f"noted/{k}", noted, (k, str(folder)), int) for k in range(n)]
 
 
 def calls(folder):
@@ -69,14 +69,14 @@ def kept(folder):
 
 @pytest.fixture
 def log(tmp_path):
-    place = tmp_path / "log"
-    place.mkdir()
-    return place
+    folder = tmp_path / "log"
+    folder.mkdir()
+    return folder
 
 
 @pytest.fixture
 def expected():
-    return {f"figure/{place}": figure(place, 7) for place in range(8)}
+    return {f"figure/{k}": figure(k, 7) for k in range(8)}
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -103,7 +103,7 @@ def test_stored_results_are_reused(tmp_path, log):
     first = TaskRunner(tmp_path).run(noted_tasks(log, 4))
     again = TaskRunner(tmp_path, notify=messages.append).run(noted_tasks(log, 6))
     assert set(calls(log).values()) == {1}
-    assert again == {f"noted/{place}": place for place in range(6)}
+    assert again == {f"noted/{k}": k for k in range(6)}
     assert first.items() <= again.items()
     assert messages == ["4 of 6 tasks are already done"]
 
@@ -128,8 +128,8 @@ def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
     assert 5 <= n_kept < 12
     done = calls(log)
     results = TaskRunner(tmp_path).run(noted_tasks(log))
-    assert results == {f"noted/{place}": place for place in range(12)}
-    again = [place for place, n in calls(log).items() if n != done.get(place, 0)]
+    assert results == {f"noted/{k}": k for k in range(12)}
+    again = [k for k, n in calls(log).items() if n != done.get(k, 0)]
     assert len(again) == 12 - n_kept
     assert max(calls(log).values()) <= 2
 
@@ -201,7 +201,7 @@ def test_tasks_of_high_cost_start_first(tmp_path):
 
     costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
     TaskRunner(tmp_path, progress=follow).run(
-        [Task(name, figure, (0, place), Figure, costs[name]) for place, name in enumerate(costs)]
+        [Task(name, figure, (0, k), Figure, costs[name]) for k, name in enumerate(costs)]
     )
     assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
 
@@ -216,10 +216,7 @@ def test_a_damaged_result_is_computed_again(tmp_path):
     first = TaskRunner(tmp_path).run(tasks(1))
     (path,) = kept(tmp_path)
     whole = path.read_bytes()
-    flipped = [
-        whole[:place] + bytes([whole[place] ^ 4]) + whole[place + 1 :]
-        for place in range(len(whole))
-    ]
+    flipped = [whole[:k] + bytes([whole[k] ^ 4]) + whole[k + 1 :] for k in range(len(whole))]
     for damaged in (*flipped, b"", whole[:-1]):
         path.write_bytes(damaged)
         assert TaskRunner(tmp_path).run(tasks(1)) == first

@@ -32,7 +32,7 @@ LOKY_WARNING = "A worker stopped while some jobs were given"
 
 
 class Engine(NamedTuple):
-    """Place where calls are made: this process, processes of this machine, or a Dask cluster.
+    """Where calls are made: this process, processes of this machine, or a Dask cluster.
 
     Attributes:
         n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
@@ -173,7 +173,7 @@ def _in_processes(
     while started or not ended:
         # Alone first, then the rest: a call that kills its process ends the run at once.
         for name in list(started):
-            yield name, _call_alone(function, name, started.pop(name))
+            yield name, _call_in_own_process(function, name, started.pop(name))
         call_named = delayed(_call_in_worker)
         tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
         with suppress(TerminatedWorkerError), _WITHOUT_WARNING:
@@ -268,7 +268,7 @@ def _end_with(parent: int) -> None:
         Thread(target=wait, name="holdfast-parent", daemon=True).start()
 
 
-def _call_alone(function: Callable[..., T], name: object, arguments: Arguments) -> T:
+def _call_in_own_process(function: Callable[..., T], name: object, arguments: Arguments) -> T:
     """Make one call in another process; only this call can be the cause if the process dies."""
     from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError

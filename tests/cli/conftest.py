@@ -25,10 +25,10 @@ def grasps(tmp_path_factory):
     from holdfast.training import Setting, train
 
     root = tmp_path_factory.mktemp("grasps")
-    for place, seeds in (("seen", (0, 1)), ("new", (2, 3))):
-        (root / place).mkdir()
+    for folder, seeds in (("seen", (0, 1)), ("new", (2, 3))):
+        (root / folder).mkdir()
         for seed in seeds:
             recording = synthetic_recording(f"grasp-{seed}", seed, ("thumb", "index"))
-            save_recording(recording, root / place / f"grasp-{seed}.parquet")
+            save_recording(recording, root / folder / f"grasp-{seed}.parquet")
     train(load_dataset(root / "seen"), Setting(trials=0)).model.save(root / "model.json")
     return root

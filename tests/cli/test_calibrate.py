@@ -21,13 +21,13 @@ SECONDS = 32.0
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A normalised model, and two recordings of handling."""
-    place = tmp_path_factory.mktemp("calibrate")
-    (place / "data").mkdir()
-    normalised_model().save(place / "model.json")
+    folder = tmp_path_factory.mktemp("calibrate")
+    (folder / "data").mkdir()
+    normalised_model().save(folder / "model.json")
     for k in range(2):
         recording = handling_recording(k, held=SECONDS / 2 + 3)
-        save_recording(recording, place / "data" / f"{recording.name}.mcap")
-    return place
+        save_recording(recording, folder / "data" / f"{recording.name}.mcap")
+    return folder
 
 
 run = Verb().run

@@ -11,7 +11,7 @@ import msgspec
 import pytest
 
 from command_line import Verb
-from holdfast import twin_recordings
+from holdfast import simulated_grasps
 from holdfast.cli import demo as verb
 from holdfast.detection import Model
 from holdfast.io import load_dataset
@@ -25,12 +25,12 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture(autouse=True)
 def small(monkeypatch):
     """Simulate one mug per case, in this process."""
-    whole = twin_recordings.simulate_grasps
+    whole = simulated_grasps.simulate_grasps
     monkeypatch.setattr(verb, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(verb, "N_DEMO_REPEATS", 1)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        twin_recordings,
+        simulated_grasps,
         "simulate_grasps",
         lambda *given, **named: whole(*given, **{**named, "engine": Engine(1)}),
     )

@@ -90,7 +90,7 @@ def test_no_scheduler_at_the_address(capsys, monkeypatch, folder):
 
 
 def test_a_folder_that_the_workers_do_not_share(capsys, cluster, monkeypatch):
-    name = "holdfast.twin_recordings.simulate_grasp"
+    name = "holdfast.simulated_grasps.simulate_grasp"
     monkeypatch.setattr(name, lambda grasp, out, force: [grasp.name])
     words = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--engine", f"dask:{cluster}")
     assert "flask-case1-1.parquet" in Verb("simulate").refusal(capsys, "there", *words)

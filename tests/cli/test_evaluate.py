@@ -80,12 +80,12 @@ def test_the_tables_have_the_trivial_baseline(capsys, grasps):
     assert rows[-1] == [str(n_events), "100.0", "100.0", "100.0", "never", "never", "0.0"]
 
 
-def mixed(grasps, place, *, labels=True):
+def mixed(grasps, folder, *, labels=True):
     """A folder with a recording that the model was trained on, and one that is new."""
-    save_recording(load_dataset(grasps / "seen")[0], place / "seen.parquet")
+    save_recording(load_dataset(grasps / "seen")[0], folder / "seen.parquet")
     new = load_dataset(grasps / "new")[0]
-    save_recording(new if labels else new.with_labels({}), place / "new.parquet")
-    return place
+    save_recording(new if labels else new.with_labels({}), folder / "new.parquet")
+    return folder
 
 
 def test_no_verdict_on_training_recordings(capsys, grasps):
@@ -105,8 +105,8 @@ def test_the_verdict_is_from_unseen_recordings_only(capsys, grasps, tmp_path):
 
 
 def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, grasps, tmp_path):
-    place = mixed(grasps, tmp_path, labels=False)
-    _, out, _ = run(capsys, grasps / "model.json", place, "--json")
+    folder = mixed(grasps, tmp_path, labels=False)
+    _, out, _ = run(capsys, grasps / "model.json", folder, "--json")
     assert json.loads(out)["verdict"] is None
 
 

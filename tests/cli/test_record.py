@@ -20,7 +20,7 @@ from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import Source, notice_arrival
 from holdfast.errors import SourceError
 from holdfast.io import load_recording, save_recording
-from holdfast.live import source_recording
+from holdfast.live import recorder_setup
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
@@ -171,7 +171,7 @@ def test_it_stops_after_the_time(capsys, device, tmp_path):
 
 
 def test_it_stops_although_the_source_is_silent(capsys, device, tmp_path, monkeypatch):
-    monkeypatch.setattr(source_recording, "EXTRA_TIME", 0.1)
+    monkeypatch.setattr(recorder_setup, "EXTRA_TIME", 0.1)
     device(arrival(0), notice_arrival(0.0, "connection\x1b lost"), ends=False)
     code, _, err = run(capsys, "xela://fake", tmp_path / "a.mcap", "--seconds", "0.3")
     assert code == 0

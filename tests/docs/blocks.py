@@ -48,7 +48,7 @@ class Block(NamedTuple):
     section: str
 
     @property
-    def place(self) -> str:
+    def location(self) -> str:
         return f"{self.page}:{self.line}"
 
 
@@ -61,9 +61,9 @@ def blocks_of(path: Path) -> list[Block]:
     ]  # fmt: skip
 
 
-def section_at(text: str, place: int) -> str:
-    """The last heading of the second level before a place in a page."""
-    return ["", *re.findall(r"^## (.*)$", text[:place], re.M)][-1]
+def section_at(text: str, offset: int) -> str:
+    """The last heading of the second level before an offset in a page."""
+    return ["", *re.findall(r"^## (.*)$", text[:offset], re.M)][-1]
 
 
 def links_of(path: Path) -> list[tuple[str, str]]:
@@ -122,9 +122,9 @@ def run_printing(block: Block, names: dict[str, object]) -> str | None:
 def check_output(block: Block, printed: str) -> None:
     """Check that the lines of a block are lines of what was printed, one after the other."""
     shown, found = ([plain(line) for line in text.splitlines()] for text in (block.text, printed))
-    places = range(len(found) - len(shown) + 1)
-    is_there = any(found[k : k + len(shown)] == shown for k in places)
-    assert is_there, f"{block.place}: this is not what was printed:\n{printed}"
+    starts = range(len(found) - len(shown) + 1)
+    is_there = any(found[k : k + len(shown)] == shown for k in starts)
+    assert is_there, f"{block.location}: this is not what was printed:\n{printed}"
 
 
 def plain(line: str) -> str:
@@ -161,14 +161,14 @@ def run_line(line: str, block: Block, *, endless: bool) -> None:
         interrupt(line, block)
     elif words[0] == "holdfast" and not SHELL_SYMBOLS.search(line):
         code = main(words[1:])
-        assert code == 0, f"{block.place}: {line!r} ended with {code}"
+        assert code == 0, f"{block.location}: {line!r} ended with {code}"
     else:
         done = subprocess.run(
             ["bash", "-euo", "pipefail", "-c", line], env=environment(), check=False,
             capture_output=True, text=True, timeout=PATIENCE,
         )  # fmt: skip
         print(done.stdout, done.stderr, sep="", end="")  # noqa: T201
-        assert done.returncode == 0, f"{block.place}: {line!r}: {done.stderr}"
+        assert done.returncode == 0, f"{block.location}: {line!r}: {done.stderr}"
 
 
 def interrupt(line: str, block: Block) -> None:
@@ -192,10 +192,10 @@ def interrupt(line: str, block: Block) -> None:
         if process.poll() is None:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-    assert first, f"{block.place}: {line!r} printed nothing"
+    assert first, f"{block.location}: {line!r} printed nothing"
     errors = [text for text in (first + rest).splitlines() if text.startswith("holdfast: ")]
-    assert set(errors) <= {"holdfast: interrupted"}, f"{block.place}: {line!r}: {errors}"
-    assert process.returncode in (0, 130), f"{block.place}: {line!r}: {first}{rest}"
+    assert set(errors) <= {"holdfast: interrupted"}, f"{block.location}: {line!r}: {errors}"
+    assert process.returncode in (0, 130), f"{block.location}: {line!r}: {first}{rest}"
 
 
 def environment() -> dict[str, str]:

@@ -1,7 +1,7 @@
 import pytest
 from msgspec.structs import replace
 
-from holdfast import twin_recordings
+from holdfast import simulated_grasps
 from holdfast.cli import demo
 from holdfast.io import save_recording
 from holdfast.parallel import Engine
@@ -19,11 +19,11 @@ SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 @pytest.fixture
 def short_demo(monkeypatch):
     """The demo with short grasps, in this process."""
-    whole = twin_recordings.simulate_grasps
+    whole = simulated_grasps.simulate_grasps
     monkeypatch.setattr(demo, "DEMO_OBJECTS", "mug")
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     monkeypatch.setattr(
-        twin_recordings,
+        simulated_grasps,
         "simulate_grasps",
         lambda *given, **named: whole(*given, **{**named, "engine": Engine(1)}),
     )

@@ -179,9 +179,9 @@ def test_any_flipped_bit_is_found(make_recording, tmp_path):
     raw = path.read_bytes()
     modules = load_labels(path).modules
     n_harmless = 0
-    for place in range(0, 8 * len(raw), 7):
+    for bit in range(0, 8 * len(raw), 7):
         damaged = bytearray(raw)
-        damaged[place // 8] ^= 1 << place % 8
+        damaged[bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
         try:
             assert load_labels(path).modules == modules

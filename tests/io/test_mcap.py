@@ -76,11 +76,11 @@ def test_messages_and_chunks_are_short(saved):
 def test_any_flipped_bit_is_found(make_recording, flipped, tmp_path):
     path, damaged = tmp_path / "a.mcap", tmp_path / "b.mcap"
     save_recording(make_recording(150), path)
-    for place, raw in flipped(path.read_bytes(), 400):
+    for offset, raw in flipped(path.read_bytes(), 400):
         damaged.write_bytes(raw)
         with pytest.raises(RecordingError):
             load_recording(damaged)
-            pytest.fail(f"bit at byte {place} not found")
+            pytest.fail(f"bit at byte {offset} not found")
 
 
 def assert_prefix(got, want):
@@ -163,22 +163,22 @@ def test_a_chunk_lost_from_the_middle_is_damage(saved):
         load_recording(path)
 
 
-def chunk_places(raw):
-    """Return the place of each chunk after the first, which holds the header."""
-    places, place = [], 8
-    while raw[place] != 15:
-        places += [place] if raw[place] == 6 else []
-        place += 9 + int.from_bytes(raw[place + 1 : place + 9], "little")
-    return places[1:]
+def chunk_offsets(raw):
+    """Return the offset of each chunk after the first, which holds the header."""
+    offsets, offset = [], 8
+    while raw[offset] != 15:
+        offsets += [offset] if raw[offset] == 6 else []
+        offset += 9 + int.from_bytes(raw[offset + 1 : offset + 9], "little")
+    return offsets[1:]
 
 
 @pytest.mark.parametrize("inside", [1, 41], ids=["length of the record", "length of its data"])
 def test_a_damaged_length_in_a_cut_file_is_no_cut(saved, inside):
     _, path, raw = saved
-    place = chunk_places(raw)[3]
+    offset = chunk_offsets(raw)[3]
     for bit in range(64):
         damaged = bytearray(raw[: len(raw) * 2 // 3])
-        damaged[place + inside + bit // 8] ^= 1 << bit % 8
+        damaged[offset + inside + bit // 8] ^= 1 << bit % 8
         path.write_bytes(damaged)
         with pytest.raises(RecordingError, match=r"(record|chunk) at byte"):
             load_recording(path)
@@ -186,10 +186,10 @@ def test_a_damaged_length_in_a_cut_file_is_no_cut(saved, inside):
 
 def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(saved):
     _, path, raw = saved
-    *_, place = [p for p in chunk_places(raw) if p < len(raw) * 2 // 3]
+    *_, offset = [p for p in chunk_offsets(raw) if p < len(raw) * 2 // 3]
     for bit in range(8):
         damaged = bytearray(raw[: len(raw) * 2 // 3])
-        damaged[place] ^= 1 << bit
+        damaged[offset] ^= 1 << bit
         path.write_bytes(damaged)
         with pytest.raises(RecordingError, match="contradicts its length"):
             load_recording(path)
@@ -198,9 +198,9 @@ def test_a_damaged_kind_of_record_in_a_cut_file_is_no_cut(saved):
 @pytest.mark.parametrize("name", [b"lz4", b"zzz\xff", b""])
 def test_another_compression_in_a_cut_file_is_refused(saved, name):
     _, path, raw = saved
-    place = chunk_places(raw)[3] + 9 + 32
+    offset = chunk_offsets(raw)[3] + 9 + 32
     damaged = bytearray(raw[: len(raw) * 2 // 3])
-    damaged[place : place + 4] = name.ljust(4, b"x")
+    damaged[offset : offset + 4] = name.ljust(4, b"x")
     path.write_bytes(damaged)
     with pytest.raises(RecordingError, match="fails its checksum"):
         load_recording(path)
@@ -209,8 +209,8 @@ def test_another_compression_in_a_cut_file_is_refused(saved, name):
 def test_zeros_in_place_of_the_last_chunks_are_a_cut(saved):
     """After a failure of the power a file has its new size, but zeros in place of the data."""
     recording, path, raw = saved
-    place = chunk_places(raw)[3]
-    for end in (place, place + 5, place + 60, place + 1000):
+    offset = chunk_offsets(raw)[3]
+    for end in (offset, offset + 5, offset + 60, offset + 1000):
         path.write_bytes(raw[:end] + bytes(20_000))
         part = load_recording(path)
         assert_prefix(part, recording)

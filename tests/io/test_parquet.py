@@ -109,9 +109,9 @@ def test_any_flipped_bit_is_found(saved, flipped):
 def test_every_character_of_the_checksum_counts(saved):
     path, raw = saved
     start = raw.index(CHECKSUM_KEY.encode())
-    for place in range(start, start + len(CHECKSUM_KEY) + 66):
+    for offset in range(start, start + len(CHECKSUM_KEY) + 66):
         damaged = bytearray(raw)
-        damaged[place] ^= 1
+        damaged[offset] ^= 1
         path.write_bytes(damaged)
         with pytest.raises(RecordingError, match="damaged"):
             load_recording(path)

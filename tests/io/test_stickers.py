@@ -1,4 +1,4 @@
-"""Stickers in videos that a test draws: places, stamps, and files that are no video."""
+"""Stickers in videos that a test draws: poses, stamps, and files that are no video."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from holdfast.errors import RecordingError
 from holdfast.io import foreign, stickers
 from holdfast.io.foreign import read_stickers
-from holdfast.io.stickers import sticker_places
+from holdfast.io.stickers import sticker_poses
 
 cv2 = pytest.importorskip("cv2")
 
@@ -45,20 +45,20 @@ def film(tmp_path_factory):
 
 
 def test_places_are_exact_to_hundredths_of_a_pixel(film):
-    times, levels, places = read_stickers(film)
+    times, levels, poses = read_stickers(film)
     assert levels == pytest.approx(np.full(N, levels[0]), rel=0.1)
     assert times == pytest.approx(np.arange(N) / 30)
-    assert sorted(places) == [0, 1]
+    assert sorted(poses) == [0, 1]
     truth = np.array([middle(k, 0) for k in range(N)])
-    away = places[0][:, :, 2] - truth
+    away = poses[0][:, :, 2] - truth
     assert away.std(axis=0).max() < 0.07
     assert np.abs(away.mean(axis=0)).max() < 0.3
-    assert places[0][:, 0, 0] == pytest.approx(np.full(N, SIDE), rel=0.03)
+    assert poses[0][:, 0, 0] == pytest.approx(np.full(N, SIDE), rel=0.03)
 
 
 def test_a_covered_sticker_is_not_seen_and_comes_back(film):
-    _, _, places = read_stickers(film)
-    seen = np.isfinite(places[1][:, 0, 0])
+    _, _, poses = read_stickers(film)
+    seen = np.isfinite(poses[1][:, 0, 0])
     assert seen[:20].all()
     assert not seen[21:24].any()
     assert seen[28:].all()
@@ -71,7 +71,7 @@ def test_the_rate_can_be_given(film):
 def test_parts_join_to_the_whole(film, monkeypatch):
     whole = read_stickers(film)
     monkeypatch.setattr(stickers, "PICTURES_PER_PART", 7)
-    parts = list(sticker_places(film))
+    parts = list(sticker_poses(film))
     assert [len(times) for times, _, _ in parts] == [7, 7, 7, 7, 7, 5]
     assert np.concatenate([times for times, _, _ in parts]) == pytest.approx(whole[0])
 

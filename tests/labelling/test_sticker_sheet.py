@@ -28,7 +28,7 @@ def test_opencv_finds_all_stickers_in_their_size():
         assert sides == pytest.approx(np.full(3, sizes[int(number)]), abs=0.3)
 
 
-def test_places_of_objects_in_the_file_are_right():
+def test_offsets_of_objects_in_the_file_are_right():
     content = sticker_sheet()
     start = int(content.split(b"startxref\n")[1].split()[0])
     assert content[start:].startswith(b"xref\n0 6\n")

@@ -74,8 +74,8 @@ def slower(times):
 
 def bursts(times):
     """From 1 s on, samples come in bursts of five at twice the rate."""
-    place = np.where(times < times[0] + 1.0, 0, np.arange(len(times)) % 5)
-    return times - 0.5 * (times[1] - times[0]) * place, slice(None)
+    index = np.where(times < times[0] + 1.0, 0, np.arange(len(times)) % 5)
+    return times - 0.5 * (times[1] - times[0]) * index, slice(None)
 
 
 def dropped(times):

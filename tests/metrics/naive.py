@@ -20,8 +20,8 @@ def segments(labels):
 
 
 def close_gaps(parts):
-    places = [i for i, part in enumerate(parts) if part[0] == "n"]
-    for i, j in pairwise(places):
+    indices = [i for i, part in enumerate(parts) if part[0] == "n"]
+    for i, j in pairwise(indices):
         if parts[j][1] - parts[i][2] < 10:
             joined = ["n", parts[i][1], parts[j][2]]
             return close_gaps([*parts[:i], joined, *parts[j + 1 :]])

@@ -62,10 +62,10 @@ def test_runs_are_wider_at_both_ends():
 
 @given(masks, st.integers(0, 5))
 def test_joining_and_widening_lose_no_sample(given_mask, n):
-    places = np.arange(len(given_mask))
-    near = [given_mask[max(k - n, 0) : k + n + 1].any() for k in places]
-    assert (widen_runs(given_mask, places, n) == near).all()
-    assert (join_runs(given_mask, places, n) >= given_mask).all()
+    indices = np.arange(len(given_mask))
+    near = [given_mask[max(k - n, 0) : k + n + 1].any() for k in indices]
+    assert (widen_runs(given_mask, indices, n) == near).all()
+    assert (join_runs(given_mask, indices, n) >= given_mask).all()
 
 
 def test_short_gaps_are_filled_between_runs_only():

@@ -20,11 +20,11 @@ def test_short_curves_are_unchanged(n):
 def test_no_peak_is_lost(n):
     rng = np.random.default_rng(n)
     times, values = np.arange(n) / 150, rng.normal(size=n)
-    places = rng.choice(n, 5, replace=False)
-    values[places] = [50, -60, 70, -80, 90]
+    indices = rng.choice(n, 5, replace=False)
+    values[indices] = [50, -60, 70, -80, 90]
     short_times, short_values = envelope(times, values)
     assert len(short_times) == len(short_values) == 4000
-    assert set(values[places]) <= set(short_values)
+    assert set(values[indices]) <= set(short_values)
     assert (np.diff(short_times) >= 0).all()
     assert (short_times[0], short_times[-1]) == (times[0], times[-1])
 

@@ -53,8 +53,8 @@ def test_flat_grids_are_complete(n, n_rows, n_columns):
     flat = flat_grid("x", n)
     assert (flat.name, flat.n_taxels, flat.range) == ("x", n, (0.0, 65535.0))
     assert len(np.unique(flat.positions, axis=0)) == n
-    places = flat.positions
-    assert (len(set(places[:, 1])), len(set(places[:, 0]))) == (n_rows, n_columns)
+    positions = flat.positions
+    assert (len(set(positions[:, 1])), len(set(positions[:, 0]))) == (n_rows, n_columns)
     assert (flat.rotations == np.eye(3)).all()
 
 

@@ -107,7 +107,7 @@ def test_each_decision_is_that_of_the_model_of_the_unit(grasps):
     assert (found.hand.states[:50] == UNKNOWN).all()
 
 
-def test_a_model_that_reports_no_slip_is_judged_by_its_ranking():
+def test_a_model_that_reports_no_slip_is_scored_by_its_ranking():
     silent = Model.load("builtin:any").with_threshold("slip", 1.0)
     verdict = evaluate_recordings(silent, [sliding_recording(0)]).verdict
     assert "Slips: none is reported until it is taught (holdfast teach); P(slip) has" in verdict

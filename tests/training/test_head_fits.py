@@ -64,8 +64,8 @@ class TestFit:
         assert fit(strange, ()) != fit(samples, ())
 
     def test_too_few_samples_that_slide(self, samples):
-        places = np.flatnonzero(samples.values > 0)[: MIN_SPEED_SAMPLES - 1]
-        rows = np.concatenate([places, np.flatnonzero(samples.values == 0)])
+        indices = np.flatnonzero(samples.values > 0)[: MIN_SPEED_SAMPLES - 1]
+        rows = np.concatenate([indices, np.flatnonzero(samples.values == 0)])
         columns = (samples.features, samples.values, samples.units, samples.units)
         few = TargetSamples(*(column[rows] for column in columns), len(rows))
         assert few.n_positive == MIN_SPEED_SAMPLES - 1

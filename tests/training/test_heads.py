@@ -161,9 +161,9 @@ def test_too_few_causes_are_a_warning():
 
 def test_the_fit_is_that_of_scikit_learn_with_balanced_classes():
     draw = np.random.default_rng(0)
-    place = draw.choice(3, p=[0.7, 0.2, 0.1], size=900)
-    features = draw.normal(size=(900, 4)) + np.eye(3, 4)[place] + [1e3, 0.0, -5.0, 0.1]
-    names = np.array([Cause.SLIP, Cause.GLITCH, Cause.CLOSING])[place].astype(str)
+    index = draw.choice(3, p=[0.7, 0.2, 0.1], size=900)
+    features = draw.normal(size=(900, 4)) + np.eye(3, 4)[index] + [1e3, 0.0, -5.0, 0.1]
+    names = np.array([Cause.SLIP, Cause.GLITCH, Cause.CLOSING])[index].astype(str)
     found, classes = fit_causes(features, names, 0.5)
     standardised = (features - features.mean(axis=0)) / features.std(axis=0)
     peer = LogisticRegression(C=0.5, class_weight="balanced", tol=1e-12, max_iter=10_000)

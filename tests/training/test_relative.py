@@ -70,7 +70,7 @@ def test_options_that_are_given_count(mixed):
 
 def test_every_recording_keeps_its_rate_and_counts_alike(mixed):
     own = samples_of(mixed)[ANY_FINGER]
-    seconds = [np.ptp(own.times[own.recordings == place]) for place in range(3)]
+    seconds = [np.ptp(own.times[own.recordings == index]) for index in range(3)]
     assert seconds == pytest.approx([7.5, 7.5, 7.5], abs=0.2)  # without the empty hand
     counts = np.bincount(own.recordings) / (2, 2, 1)
     assert counts == pytest.approx([150, 150, 150], abs=3)

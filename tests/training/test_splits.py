@@ -32,15 +32,15 @@ def test_a_unit_of_the_split_by_recording_is_a_recording():
 def test_a_unit_of_the_split_by_object_is_all_its_recordings():
     data_split = split_data(entries("can", "egg", "can"), "object", 0)
     assert data_split.units == ("can", "egg")
-    assert [data_split.units_of(place, 1)[0] for place in range(3)] == [0, 1, 0]
+    assert [data_split.units_of(index, 1)[0] for index in range(3)] == [0, 1, 0]
     assert data_split.recordings_without({0}) == [1]
 
 
-@given(seed=st.integers(0, 2**32 - 1), place=st.integers(0, 50))
-def test_random_fifths(seed, place):
+@given(seed=st.integers(0, 2**32 - 1), index=st.integers(0, 50))
+def test_random_fifths(seed, index):
     data_split = split_data(entries("can"), "random", seed)
-    units = data_split.units_of(place, 2000)
-    assert (units == data_split.units_of(place, 2000)).all()
+    units = data_split.units_of(index, 2000)
+    assert (units == data_split.units_of(index, 2000)).all()
     shares = np.bincount(units, minlength=RANDOM_FOLDS) / 2000
     assert shares == pytest.approx(0.2, abs=0.06)
     assert data_split.recordings_without({0}) == [0]

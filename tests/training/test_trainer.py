@@ -87,8 +87,8 @@ def test_cross_validation_equals_separate_trainings(grasps):
     """Each recording is evaluated by a model that is trained on the others alone."""
     trained = train(grasps, SETTING)
     evaluated = []
-    for place, recording in enumerate(grasps):
-        others = [other for k, other in enumerate(grasps) if k != place]
+    for index, recording in enumerate(grasps):
+        others = [other for k, other in enumerate(grasps) if k != index]
         evaluated.append(compute_decisions(train(others, SETTING).model, recording))
     expected = summarise(evaluated)
     assert trained.cross_validation.pooled.confusion == expected.pooled.confusion
@@ -120,8 +120,8 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
     monkeypatch.setattr(trainer, "score_recording", keep)
     train(grasps, replace(SETTING, split="random"))
-    for place, decisions in enumerate(given_decisions):
-        units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(place, 400)
+    for index, decisions in enumerate(given_decisions):
+        units = split_data(scan_dataset(grasps).recordings, "random", 0).units_of(index, 400)
         for k, finger in enumerate(decisions.fingers.values()):
             number = 2 + 2 * units + k
             expected = 1 / (1 + np.exp(-0.1 * number))

@@ -32,14 +32,14 @@ def test_rows_are_the_features_of_the_labelled_samples(grasps):
     """By force and Haar window of each recording alone: windows never cross a boundary."""
     own = finger_samples(grasps)["index"]
     rows, stable, groups = [], [], []
-    for place, recording in enumerate(grasps):
+    for index, recording in enumerate(grasps):
         module = recording.modules["index"]
         force = fingertip_force(module.readings, TINY, 0.5, module.times)
         features = haar_features(force, 6)
         usable = np.isfinite(features).all(axis=1)
         rows.append(features[usable])
         stable.append((module.label_states == STABLE)[usable])
-        groups += [place] * usable.sum()
+        groups += [index] * usable.sum()
     np.testing.assert_allclose(own.samples.features, np.concatenate(rows), atol=1e-9)
     assert (own.samples.positive == np.concatenate(stable)).all()
     assert own.samples.groups.tolist() == groups == own.units.tolist()

@@ -27,8 +27,8 @@ def metrics(states, probability=RIGHT, labels=LABELS, n=1, **exact):
 
 def with_false_alarms(every, first=50):
     """Right decisions, and a false alarm every so many samples of stable label."""
-    places = np.arange(len(LABELS))
-    wrong = (LABELS == STABLE) & (places % every == first)
+    indices = np.arange(len(LABELS))
+    wrong = (LABELS == STABLE) & (indices % every == first)
     return np.where(wrong, UNSTABLE, LABELS)
 
 

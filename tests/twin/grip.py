@@ -38,7 +38,7 @@ class Grip:
         self.bodies: Array = np.zeros((len(angles) + 1, 18))
         self.bodies[-1, 3:12] = np.eye(3).ravel()
         for body, angle in zip(self.bodies, angles, strict=False):
-            place(body, surface, solid(replace(item, texture_amplitude=0.0)), angle, depth)
+            set_pose(body, surface, solid(replace(item, texture_amplitude=0.0)), angle, depth)
 
     @property
     def mass(self) -> float:
@@ -78,7 +78,7 @@ class Grip:
             self.step()
 
 
-def place(body: Array, surface: Surface, shape: Array, angle: float, depth: float) -> None:
+def set_pose(body: Array, surface: Surface, shape: Array, angle: float, depth: float) -> None:
     """Put a fingertip at an angle about the object's axis, its deepest node `depth` inside."""
     out = np.array([np.cos(angle), np.sin(angle), 0.0])
     rotation = np.stack([-out, np.cross([0.0, 0.0, 1.0], -out), [0.0, 0.0, 1.0]], axis=1)

@@ -28,21 +28,21 @@ def test_every_object_can_be_grasped(name, table, miss):
     assert path.misses.max() < miss
     assert path.cosines.min() > 0.9  # 25 degrees
     limits = HandModel.build(item).limits()
-    for place, finger in enumerate(FINGERS):
+    for index, finger in enumerate(FINGERS):
         own = limits[JOINTS[finger] : JOINTS[finger] + 4]
-        assert (path.joints[place] >= own[:, 0]).all()
-        assert (path.joints[place] <= own[:, 1]).all()
+        assert (path.joints[index] >= own[:, 0]).all()
+        assert (path.joints[index] <= own[:, 1]).all()
     assert np.abs(np.diff(path.joints, axis=1)).max() < 0.35  # no jump to another solution
 
 
 @pytest.mark.parametrize("name", OBJECTS)
 def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name):
     item = replace(object_named(name), texture_amplitude=0.0)
-    place, turn = object_pose(item)
+    position, turn = object_pose(item)
     c, s = np.cos(turn), np.sin(turn)
     for finger in FINGERS:
         push, points = aims_of(item, finger)
-        world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - place
+        world = points @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]] - position
         own = world @ [[c, -s, 0], [s, c, 0], [0, 0, 1]]
         far = distance_to(item, own)
         touch = np.abs(PATH_GAPS).argmin()
@@ -54,9 +54,9 @@ def test_pads_aim_at_the_surface_of_the_object_where_it_stands(name):
 def test_targets_go_along_the_path(can):
     for k, depth in enumerate(can.depths):
         joints = can.targets(np.full(4, depth))
-        for place, finger in enumerate(FINGERS):
+        for index, finger in enumerate(FINGERS):
             np.testing.assert_allclose(
-                joints[JOINTS[finger] : JOINTS[finger] + 4], can.joints[place, k]
+                joints[JOINTS[finger] : JOINTS[finger] + 4], can.joints[index, k]
             )
     between = can.targets(np.full(4, 0.5 * (can.depths[3] + can.depths[4])))
     first = JOINTS["ring"]

@@ -26,9 +26,9 @@ STYLES = (PUSH, JERK, SHAKE)
 WEIGHT = 2.0
 
 
-def body(place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), velocity=(0.0,) * 6):
+def body(position=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0), velocity=(0.0,) * 6):
     rotation = Rotation.from_rotvec(turn).as_matrix().ravel()
-    return np.array([*place, *rotation, *velocity], dtype=float)
+    return np.array([*position, *rotation, *velocity], dtype=float)
 
 
 def parameters(direction=(0.0, 0.0, -1.0), arm=(0.0, 0.0, 0.0), depth=0.006, stiffness=700.0):
@@ -50,19 +50,19 @@ class TestTremor:
     def test_has_an_rms_of_one(self):
         times = np.arange(0, 60, 1 / 150)
         for axis in range(3):
-            places = [tremor_at(STILL, time, axis)[0] for time in times]
-            assert np.std(places) == pytest.approx(1.0, rel=0.02)
-            assert np.mean(places) == pytest.approx(0.0, abs=0.02)
+            positions = [tremor_at(STILL, time, axis)[0] for time in times]
+            assert np.std(positions) == pytest.approx(1.0, rel=0.02)
+            assert np.mean(positions) == pytest.approx(0.0, abs=0.02)
 
     def test_keeps_to_its_band(self):
         times = np.arange(0, 60, 1 / 150)
-        places = np.array([tremor_at(STILL, time, 0)[0] for time in times])
-        power = np.abs(np.fft.rfft(places * np.hanning(len(places)))) ** 2
-        rates = np.fft.rfftfreq(len(places), 1 / 150)
+        positions = np.array([tremor_at(STILL, time, 0)[0] for time in times])
+        power = np.abs(np.fft.rfft(positions * np.hanning(len(positions)))) ** 2
+        rates = np.fft.rfftfreq(len(positions), 1 / 150)
         band = (rates > TREMOR_BAND[0] - 0.1) & (rates < TREMOR_BAND[1] + 0.1)
         assert power[band].sum() / power.sum() > 0.999
 
-    def test_its_speed_is_the_slope_of_its_place(self):
+    def test_its_speed_is_the_slope_of_its_position(self):
         step = 1e-6
         for time in (0.0, 0.3, 7.7):
             before, after = tremor_at(STILL, time - step, 1)[0], tremor_at(STILL, time + step, 1)[0]
@@ -105,7 +105,7 @@ class TestPush:
     @pytest.mark.slow
     @settings(max_examples=200)
     @given(
-        place=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
+        position=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
         velocity=st.tuples(*[st.floats(-2, 2)] * 6),
         style=st.sampled_from(STYLES),
         elapsed=st.floats(0, 0.8),
@@ -113,14 +113,14 @@ class TestPush:
         seed=st.integers(0, 2**16),
     )
     def test_never_pulls_and_never_passes_its_limit(
-        self, place, velocity, style, elapsed, rms, seed
+        self, position, velocity, style, elapsed, rms, seed
     ):
         random = np.random.default_rng(seed)
         direction = random.normal(size=3)
         direction /= np.linalg.norm(direction)
         arm = np.cross(direction, random.normal(0, 0.006, 3))
         drawn = parameters(direction, arm)
-        out = push(body(place, velocity=velocity), drawn, style, rms, elapsed)
+        out = push(body(position, velocity=velocity), drawn, style, rms, elapsed)
         along = out[:3] @ direction
         assert 0.0 <= along <= PUSH_LIMIT + 1e-9
         np.testing.assert_allclose(out[:3], along * direction, atol=1e-9)
@@ -134,12 +134,12 @@ class TestPush:
     @pytest.mark.parametrize("style", STYLES)
     def test_goes_there_and_back(self, style):
         times, motion = course(style)
-        places, speeds = motion.T
-        assert places[0] == pytest.approx(0.0, abs=1e-12)
-        assert places[-1] == pytest.approx(0.0, abs=1e-12)
-        assert places.min() >= -1e-12
-        assert 0.8 * (0.006 + PUSH_GAP) < places.max() <= 0.006 + PUSH_GAP + 1e-12
-        slope = np.gradient(places, times)
+        positions, speeds = motion.T
+        assert positions[0] == pytest.approx(0.0, abs=1e-12)
+        assert positions[-1] == pytest.approx(0.0, abs=1e-12)
+        assert positions.min() >= -1e-12
+        assert 0.8 * (0.006 + PUSH_GAP) < positions.max() <= 0.006 + PUSH_GAP + 1e-12
+        slope = np.gradient(positions, times)
         np.testing.assert_allclose(speeds[1:-1], slope[1:-1], atol=1e-4)
 
     def test_a_still_object_is_pressed_by_the_spring(self):

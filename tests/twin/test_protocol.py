@@ -225,15 +225,15 @@ def test_a_disturbance_has_its_index_and_time(slip, phase):
 def test_the_operator_holds_the_object_where_it_was():
     table = Table()
     table.item[:3] = 1.0, 2.0, 3.0
-    places = []
+    positions = []
 
     def loads(time, depths):
-        places.append(table.protocol.anchor[:3].copy())
+        positions.append(table.protocol.anchor[:3].copy())
         if table.protocol.locked_at is not None and len(table.protocol.anchor):
             table.item[0] = 1.01
         return 4000 * (TOUCHED - depths)
 
     table.run(loads)
-    np.testing.assert_array_equal(places[1], [1.0, 2.0, 3.0])
+    np.testing.assert_array_equal(positions[1], [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(table.protocol.anchor[:3], [1.01, 2.0, 3.0])
     np.testing.assert_array_equal(table.protocol.anchor[3:], np.eye(3).ravel())

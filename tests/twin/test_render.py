@@ -95,9 +95,9 @@ class TestPictures:
         after = render(hand, view, forces)
         changed = np.flatnonzero((before != after).any(axis=(0, 2)))
         height = 2 * 0.3 * np.tan(np.radians(hand.model.vis.global_.fovy / 2))
-        places = (changed + 0.5 - 80) / 120 * height
-        assert places.max() == pytest.approx(0.04, abs=0.004)
-        assert places.min() == pytest.approx(-0.01, abs=0.004)
+        heights = (changed + 0.5 - 80) / 120 * height
+        assert heights.max() == pytest.approx(0.04, abs=0.004)
+        assert heights.min() == pytest.approx(-0.01, abs=0.004)
 
     def test_leave_out_forces_of_zero_or_nan(self, renderer, hand):
         nothing = np.array([[0.1, 0, 0, 0, 0, 0.01], [0.1, 0, 0, 0, np.nan, 0]])

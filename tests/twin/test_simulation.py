@@ -140,8 +140,8 @@ class TestTruth:
         span = slice(200, None)
         force = on_object(pushed, span) + truth.hand["outside_force"][span]
         force[:, 2] -= GRAVITY * mass
-        place = truth.hand["object_pose"][span, :3]
-        velocity = np.gradient(place, 1 / 150, axis=0)
+        position = truth.hand["object_pose"][span, :3]
+        velocity = np.gradient(position, 1 / 150, axis=0)
         for k in range(0, len(force) - 300, 150):
             gained = mass * (velocity[k + 299] - velocity[k])
             given = force[k : k + 299].sum(axis=0) / 150

@@ -42,9 +42,9 @@ def event(kind, start=1.0, duration=4.0, distance=0.001):
     )  # fmt: skip
 
 
-def body(place=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
+def body(position=(0.0, 0.0, 0.0), turn=(0.0, 0.0, 0.0)):
     rotation = Rotation.from_rotvec(turn).as_matrix().ravel()
-    return np.concatenate([place, rotation, np.zeros(6)])
+    return np.concatenate([position, rotation, np.zeros(6)])
 
 
 def run(events, slip=lambda _: 0.0, seconds=7.0, pose=None):

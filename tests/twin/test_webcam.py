@@ -21,10 +21,10 @@ def grasp():
     pose = np.tile([0.11, -0.01, 0.02, 1.0, 0, 0, 0], (N, 1))
     pose[:, :3] += 0.006 * (times / times[-1])[:, None] * SIDEWAYS
     turn = [0.58, 0.47, 0.35, 0.57]
-    places = pose[0, :3] + 0.05 * GRASP_LINE + np.outer((0.03, 0.0, -0.03), (0, 0, 1))
+    positions = pose[0, :3] + 0.05 * GRASP_LINE + np.outer((0.03, 0.0, -0.03), (0, 0, 1))
     tips = {
-        finger: {"tip_pose": np.tile([*place, *turn], (N, 1))}
-        for finger, place in zip(VISIBLE, places, strict=True)
+        finger: {"tip_pose": np.tile([*position, *turn], (N, 1))}
+        for finger, position in zip(VISIBLE, positions, strict=True)
     }
     phase = np.full(N, "locked")
     made = synthetic_recording("can-1", seed=0)
@@ -41,20 +41,20 @@ def film(tmp_path_factory):
 
 
 def test_all_stickers_are_read(film):
-    times, _, places = film
-    assert sorted(places) == [0, 2, 3, 4]  # the thumb is behind the object
+    times, _, poses = film
+    assert sorted(poses) == [0, 2, 3, 4]  # the thumb is behind the object
     assert times == pytest.approx(np.arange(len(times)) / 30)
-    assert all(np.isfinite(place).all() for place in places.values())
-    side = np.linalg.svd(places[3][:, :, :2], compute_uv=False)[:, 0].mean()
+    assert all(np.isfinite(pose).all() for pose in poses.values())
+    side = np.linalg.svd(poses[3][:, :, :2], compute_uv=False)[:, 0].mean()
     expected = 1e3 * TIP_SIZE * CAMERA.focal_length / (1e3 * (CAMERA.distance - 0.065))
     assert side == pytest.approx(expected, rel=0.2)
 
 
 def test_motion_is_that_of_the_truth_on_a_clock_of_its_own(film):
-    times, _, places = film
+    times, _, poses = film
     shift = clock_shift(grasp())
     share = np.clip((times + shift + 0.010) / ((N - 1) / 150), 0, 1)
-    moved = places[0][:, 0, 2] - places[0][:1, 0, 2]
+    moved = poses[0][:, 0, 2] - poses[0][:1, 0, 2]
     pixels = 0.006 * (share - share[0]) * CAMERA.focal_length / (CAMERA.distance - 0.033)
     assert np.abs(np.abs(moved) - pixels * np.cos(CAMERA.turn[0])).max() < 0.5
-    assert np.ptp(places[3][:, :, 2], axis=0).max() < 0.1
+    assert np.ptp(poses[3][:, :, 2], axis=0).max() < 0.1

@@ -43,8 +43,8 @@ def run(made, seconds, **words):
 
 def test_begins_as_the_object_is_put_there():
     made = world(start=(0.001, -0.002, 0.003, 0.1))
-    place, turn = object_pose(object_named("can"))
-    np.testing.assert_allclose(made.bodies[-1, :3], place + np.array([0.001, -0.002, 0.003]))
+    position, turn = object_pose(object_named("can"))
+    np.testing.assert_allclose(made.bodies[-1, :3], position + np.array([0.001, -0.002, 0.003]))
     assert np.arctan2(made.bodies[-1, 6], made.bodies[-1, 3]) == pytest.approx(turn + 0.1)
     assert not made.loads.any()
     assert made.slip == 0.0

@@ -13,7 +13,7 @@ PAGES = [PACKAGE / "live" / "web" / "page", PACKAGE / "labelling" / "page"]
 NAMED = re.compile(r'(?:src|href)="([^"#]+)"|^(?:import|export)\b.* from "([^"]+)";$', re.MULTILINE)
 
 
-def place(page, file, name):
+def path_of(page, file, name):
     """Path of a file that another file names; /page and /web are siblings in the URL."""
     folder = "." if file.suffix == ".html" else "web" if file.parent == SHARED else "page"
     top, *rest = Path(normpath(f"{folder}/{name}")).parts
@@ -30,7 +30,7 @@ def test_every_file_that_a_page_names_exists(page):
         seen.add(file)
         if file.suffix in (".html", ".js"):
             names = [one or two for one, two in NAMED.findall(file.read_text())]
-            waiting += [place(page, file, name) for name in names]
+            waiting += [path_of(page, file, name) for name in names]
     assert [str(file) for file in seen if not file.is_file()] == []
     shared = set(SHARED.iterdir())
     assert shared <= seen  # a file that only one page uses belongs to that page

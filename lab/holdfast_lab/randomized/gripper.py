@@ -163,7 +163,7 @@ def gripper_model(
 
 def _pad_xml(layout: PadLayout, i: int, drives: Drives) -> str:
     frame = layout.frames[i]
-    place = layout.points[i] + OPEN_GAP * layout.outward[i] - frame @ layout.contact_point
+    position = layout.points[i] + OPEN_GAP * layout.outward[i] - frame @ layout.contact_point
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(frame).ravel())
     # A pad slides along its closing line and, on side springs, along two axes across it.
@@ -177,7 +177,7 @@ def _pad_xml(layout: PadLayout, i: int, drives: Drives) -> str:
         for axis in axes[1:]
     )
     return (
-        f'<body name="pad{i}" pos="{_text(place)}" quat="{_text(quaternion)}">'
+        f'<body name="pad{i}" pos="{_text(position)}" quat="{_text(quaternion)}">'
         f'<joint type="slide" axis="{_text(axes[0])}"/>{sides}'
         f'<geom type="box" size=".012 .012 .004" mass="{drives.mass:.9g}"/></body>'
     )

@@ -23,7 +23,7 @@ N_VIBRATIONS = 12
 VIBRATION_FADE = 0.1
 """Time in which the vibration of a moving arm rises and fades [s]."""
 PALM_KINDS = ("carry", "swing", "brake", "turn")
-"""Motions of an arm: to another place, to and fro, a sudden stop, a turn against gravity."""
+"""Motions of an arm: to another position, to and fro, a sudden stop, a turn against gravity."""
 
 
 class PalmMotion(NamedTuple):
@@ -178,12 +178,12 @@ def _down(orientation: Array, spin: Array) -> Array:
     # Only the rows that turn are multiplied; the rows between two of them repeat the last.
     steps = Rotation.from_rotvec(-spin[moving] / GRID_RATE).as_matrix()
     now = down[0].copy()
-    place = 0
+    start = 0
     for row, step in zip(moving.tolist(), steps, strict=True):
-        down[place:row] = now
+        down[start:row] = now
         now = step @ now
-        place = row
-    down[place:] = now
+        start = row
+    down[start:] = now
     return down
 
 
@@ -199,10 +199,10 @@ def draw_carrier(
     generator: np.random.Generator, ranges: Mapping[str, Mapping[str, Any]]
 ) -> str | None:
     """Draw one of `CARRIERS`, or None for a hand that only moves in events."""
-    place = generator.random()
-    if place < ranges["carry"]["share"]:
+    draw = generator.random()
+    if draw < ranges["carry"]["share"]:
         return "carry"
-    return "person" if place > 1 - ranges["person"]["share"] else None
+    return "person" if draw > 1 - ranges["person"]["share"] else None
 
 
 def carrying_legs(

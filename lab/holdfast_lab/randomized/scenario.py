@@ -205,7 +205,7 @@ class Scenario(OperatorForce):
     def __init__(self, events: list[Event], tremors: Array, tremor: float) -> None:
         self._events = events
         self._tremors, self._tremor = tremors, tremor
-        self._place = -1  # index of the present event, or of the one that is awaited
+        self._index = -1  # index of the present event, or of the one that is awaited
         # Of the present event: how far the object slid [m] and turned [rad] while it slid, when it
         # ended [s] (its effects go away after that), and the object when it began.
         self._slid = self._turned = 0.0
@@ -233,11 +233,11 @@ class Scenario(OperatorForce):
         event = self.event
         if event is None or since >= event.start + event.duration + RECOVERY_TIME:
             # Begin the next event, if it is time; added weight and a changed grip stay.
-            coming = self._events[self._place + 1 : self._place + 2]
+            coming = self._events[self._index + 1 : self._index + 2]
             if not coming or coming[0].start <= since:
                 self.friction_scale = 1.0
             if coming and coming[0].start <= since:
-                self._place += 1
+                self._index += 1
                 self._slid = self._turned = 0.0
                 self._ended_at = math.inf
                 self._origin[:] = body[:12]
@@ -279,7 +279,7 @@ class Scenario(OperatorForce):
     @property
     def event(self) -> Event | None:
         """The present or the next event."""
-        return self._events[self._place] if 0 <= self._place < len(self._events) else None
+        return self._events[self._index] if 0 <= self._index < len(self._events) else None
 
     def fill(self, body: Array, out: Array, ahead: float) -> None:
         """Fill the operator's force and torque: see `OperatorForce`."""

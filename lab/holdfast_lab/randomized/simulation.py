@@ -47,7 +47,7 @@ from holdfast_lab.randomized.palm import (
 from holdfast_lab.randomized.scenario import Scenario, draw_events
 
 MAX_TRIES = 12
-"""Draws of an object and a place of the pads until the pads reach it."""
+"""Draws of an object and positions of the pads until the pads reach it."""
 MAX_SECONDS = 45.0
 """Longest recording [s]."""
 HOLD_ATTEMPTS = 6
@@ -68,7 +68,7 @@ class RandomHold:
         kind: of the sensor; None draws it.
         attempt: from 0 on; a hold that fails at once is drawn again.
         grasp: from 1 on, for several grasps of one hand: hand, grip, sensor and gains depend on
-            the number alone; object, place of the pads and events on the grasp too. None for
+            the number alone; object, positions of the pads and events on the grasp too. None for
             the only grasp of a hand.
         measured: mechanisms of `drawing.MEASURED` with which the sensor is read and the arm
             moves as real ones do. All else that is drawn is the same with and without them.

@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
-from holdfast import twin_recordings
+from holdfast import simulated_grasps
 from holdfast.errors import HoldfastError, OutputError
 from holdfast.files import file_stem
 from holdfast.io import import_recordings, save_recording
 from holdfast.parallel import Engine
+from holdfast.simulated_grasps import GraspSteps
 from holdfast.twin.objects import OTHER_OBJECTS
-from holdfast.twin_recordings import GraspSteps
 from holdfast_lab.study.plan import Corpus, StudyPlan, scan_corpus
 
 Notify = Callable[[str], None]
@@ -154,13 +154,13 @@ def simulate_corpus(
     seed += corpus.seed_offset
     grasps = [
         replace(grasp, glitch_rate=corpus.glitch_rate)
-        for grasp in twin_recordings.plan_grasps(
+        for grasp in simulated_grasps.plan_grasps(
             "", corpus.cases, repeats, corpus.profile, seed, table=table, faults=corpus.faults
         )
     ]
     folder.mkdir(parents=True, exist_ok=True)
     try:
-        twin_recordings.simulate_grasps(
+        simulated_grasps.simulate_grasps(
             grasps, folder,
             engine=Engine(jobs), force=False, notify=notify, steps=steps,
         )  # fmt: skip

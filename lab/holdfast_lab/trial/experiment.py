@@ -25,14 +25,14 @@ from holdfast_lab.trial.figures import (
     kinds_figure,
     trade_off_figure,
 )
-from holdfast_lab.trial.plan import TrialPlan
-from holdfast_lab.trial.tables import (
+from holdfast_lab.trial.law_tables import (
     fingers_table,
     kinds_table,
     law_tables,
     objects_table,
     paired_table,
 )
+from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.trials import draw_trial
 
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))

@@ -118,7 +118,7 @@ def patches_of(world: World) -> list[Patch]:
         touching = np.any(forces != 0.0, axis=1)
         arms = finger[:3] + world.constants.nodes[touching, :3] @ turn.T - item[:3]
         solid = world.constants.solid
-        outward = np.array([probe(solid, *place)[1:] for place in arms @ back]) @ back.T
+        outward = np.array([probe(solid, *position)[1:] for position in arms @ back]) @ back.T
         # A node whose friction pulls outward presses nothing.
         pressed = np.maximum(np.sum(forces[touching] @ turn.T * outward, axis=1), 0.0)
         middle = pressed @ arms / pressed.sum()

@@ -25,7 +25,7 @@ from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_grip.command import GripReason
 from holdfast_grip.laws import LAWS, Law, Touch, law_named
-from holdfast_grip.laws.base import Wish, stay
+from holdfast_grip.laws.base import ForceTarget, stay
 from holdfast_grip.limits import Limits
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.trials import Trial
@@ -55,7 +55,7 @@ class ConstantForce(Law):
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Do nothing."""
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scale for all fingers."""
         return [(self.scale, GripReason.MARGIN) for _ in touches]
 
@@ -87,7 +87,7 @@ class KnownLoad(Law):
         if not self._began:
             self.start_force = float(simulation.world.loads.sum())
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scale that gives the multiple of the least force."""
         # Nothing to press with, or no force that holds: an oracle has no answer, so it stays.
         if not (self.start_force > 0 and self.force < np.inf):
@@ -120,7 +120,7 @@ class V5Reflex(Law):
         """Begin a grip."""
         self._raised = False
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return a scale of 2 from when the sum has exceeded the level."""
         first = sum(touch.start_normal for touch in touches)
         total = sum(touch.normal for touch in touches if touch.known)

@@ -56,7 +56,7 @@ class RandomizedHands:
             ValueError: a number is out of range.
             OutputError: an existing recording has another seed or profile.
         """
-        from holdfast.twin_recordings import check_numbers, is_recorded, path_of, simulate_all
+        from holdfast.simulated_grasps import check_numbers, is_recorded, path_of, simulate_all
         from holdfast_lab.randomized.simulation import RandomHold
 
         if not options.randomize:
@@ -109,7 +109,7 @@ def mechanisms_of(text: str) -> tuple[str, ...]:
 def simulate_hand(hold: "RandomHold", out: Path, force: bool) -> list[str]:
     """Simulate a randomized hand; return the name of the recording."""
     from holdfast.io import save_recording
-    from holdfast.twin_recordings import path_of
+    from holdfast.simulated_grasps import path_of
     from holdfast_lab.randomized.simulation import simulate_random
 
     save_recording(simulate_random(hold), path_of(hold.name, out), force=force)

@@ -35,11 +35,11 @@ def brute_force(values, stable, side):
     """The best balanced accuracy of all cuts between two different values."""
     ordered = sorted(set(values.tolist()))
     found = []
-    for place in [(a + b) / 2 for a, b in pairwise(ordered)]:
+    for threshold in [(a + b) / 2 for a, b in pairwise(ordered)]:
         if side != "below":
-            found.append(balanced_accuracy(values > place, stable))
+            found.append(balanced_accuracy(values > threshold, stable))
         if side != "above":
-            found.append(balanced_accuracy(values < place, stable))
+            found.append(balanced_accuracy(values < threshold, stable))
     return max(found, default=0.5)
 
 
@@ -86,7 +86,7 @@ def test_the_best_feature_is_taken_and_the_first_of_equals():
     assert [c != 0 for c in fitted.rule.weights[0]] == [False, True, False, False]
 
 
-def test_scale_and_place_do_not_matter():
+def test_scale_and_offset_do_not_matter():
     rng = np.random.default_rng(1)
     values = rng.lognormal(size=500)
     stable = rng.random(500) < 1 / (1 + values)

@@ -101,10 +101,10 @@ def test_an_arm_goes_to_and_fro_on_a_level_line_as_fast_as_the_boxes(seed):
     acceleration = (-moved.gravity - orientation.T @ [0.0, 0.0, GRAVITY]) @ orientation.T
     np.testing.assert_allclose(acceleration[:, 2], 0.0, atol=1e-9)
     speeds = np.linalg.norm(np.cumsum(acceleration, axis=0), axis=1) / GRID_RATE
-    places = np.cumsum(np.cumsum(acceleration, axis=0), axis=0) / GRID_RATE**2
+    positions = np.cumsum(np.cumsum(acceleration, axis=0), axis=0) / GRID_RATE**2
     assert 0.25 < speeds.max() < 0.62
     assert 0.15 < np.linalg.norm(acceleration, axis=1).max() < 1.2
-    assert np.linalg.norm(places, axis=1).max() < 0.75
+    assert np.linalg.norm(positions, axis=1).max() < 0.75
     assert 0.5 < np.mean(speeds > 0.02) < 0.9
     starts = np.array([leg.start for leg in legs])
     ends = starts + [leg.duration for leg in legs]

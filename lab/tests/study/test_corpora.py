@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from holdfast import twin_recordings
+from holdfast import simulated_grasps
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.synthetic import synthetic_recording
@@ -59,7 +59,7 @@ def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
 def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
     given = []
     monkeypatch.setattr(
-        twin_recordings, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
+        simulated_grasps, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
     )
     corpora.simulate_corpus(
         tmp_path / "one", corpora.TWIN_CORPORA["glitch-1"], 5, 1, 1, print_message, progress

@@ -19,7 +19,7 @@ LIFT = np.array([0.0, 0.0, 2.0])
 
 
 def patch(x, z=0.0, size=0.004):
-    """A patch at a place of the x axis that pushes towards the middle."""
+    """A patch at a position on the x axis that pushes towards the middle."""
     corners = size * np.array([[0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
     return Patch(corners + np.array([x, 0.0, z]), np.array([-np.sign(x), 0.0, 0.0]))
 

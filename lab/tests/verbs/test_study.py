@@ -4,7 +4,7 @@ import msgspec
 import pytest
 
 from command_line import Verb
-from holdfast import twin_recordings
+from holdfast import simulated_grasps
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
@@ -39,9 +39,9 @@ def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
     brief = msgspec.structs.replace(profile("reference"), idle=(0.7, 0.8), hold=1.5)
     monkeypatch.setattr(simulation, "profile", lambda name: brief)
     monkeypatch.setattr(corpora, "QUICK_CORPORA", {"main": corpora.TwinCorpus(repeats=1)})
-    known = twin_recordings.plan_grasps
+    known = simulated_grasps.plan_grasps
     monkeypatch.setattr(
-        twin_recordings, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
+        simulated_grasps, "plan_grasps", lambda _, *rest, **more: known("can", *rest, **more)
     )
     out = tmp_path / "out"
     words = ("--twin", "--quick", "--jobs", 1, "--out", out, "--json")

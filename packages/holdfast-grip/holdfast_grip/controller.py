@@ -394,23 +394,23 @@ class GripController:
     def _control(self, time: float, dt: float) -> GripCommand:
         """Apply the law within the limits."""
         limits, commands, highest = self.limits, self._commands, self._highest
-        wishes = self.law.wishes(self._touches, time, dt)
-        if len(wishes) != len(self._touches):
-            raise ValueError(_broken_law(self.law, len(self._touches), f"{len(wishes)} wishes"))
+        targets = self.law.targets(self._touches, time, dt)
+        if len(targets) != len(self._touches):
+            raise ValueError(_broken_law(self.law, len(self._touches), f"{len(targets)} targets"))
         # A rise shakes the contacts, and an UNKNOWN finger may slip: nothing falls then.
         may_fall = self._all_known and time - self._raised_at >= limits.cooldown
         rising = falling = False
         for k, touch in enumerate(self._touches):
             scale = touch.scale
-            wanted, reason = wishes[k]
-            if math.isnan(wanted):
+            target, reason = targets[k]
+            if math.isnan(target):
                 raise ValueError(_broken_law(self.law, len(self._touches), "a scale of nan"))
-            wanted = min(max(wanted, limits.min_scale), highest[k])
-            if wanted > scale and reason is not _NONE:
-                self._set(touch, min(wanted, scale + limits.rise * dt), reason, time)
+            target = min(max(target, limits.min_scale), highest[k])
+            if target > scale and reason is not _NONE:
+                self._set(touch, min(target, scale + limits.rise * dt), reason, time)
                 rising = True
-            elif wanted < scale and may_fall:
-                self._set(touch, max(wanted, scale - limits.fall * dt), GripReason.RELAX, time)
+            elif target < scale and may_fall:
+                self._set(touch, max(target, scale - limits.fall * dt), GripReason.RELAX, time)
                 falling = True
             elif commands[touch.finger].reason is not _NONE:
                 commands[touch.finger] = FingerCommand(scale)

@@ -17,7 +17,7 @@ from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
 from holdfast.io.definitions import Definition, field_paths, parse_definition, short_name
 from holdfast.io.importers.table import natural_order
-from holdfast.io.mcap_records import has_end
+from holdfast.io.mcap_chunks import has_end
 from holdfast.io.safe_reading import one_line
 from holdfast.sensors.types import Array
 from holdfast_ros.sensor_messages import known_definition

@@ -16,10 +16,10 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_tables import recordings_of_arrays
+from holdfast.io.importers.array_conversion import recordings_of_arrays
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import first_texts
-from holdfast.io.importers.table_recordings import ANY_MODULE
+from holdfast.io.importers.table_conversion import ANY_MODULE
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array
@@ -175,9 +175,9 @@ class _DeviceTrack:
         n_kept = 1 + int(np.count_nonzero(steps > 0))
         if not (steps >= 0).all() or not len(dated) or 2 * n_kept < len(times):
             return 0
-        places = first + np.flatnonzero(np.append(True, steps > 0))
-        self.readings = [self.readings[place] for place in places]
-        self.stamps = [self.stamps[place] for place in places]
+        indices = first + np.flatnonzero(np.append(True, steps > 0))
+        self.readings = [self.readings[index] for index in indices]
+        self.stamps = [self.stamps[index] for index in indices]
         return len(times) - n_kept
 
     def times(self, clock: str) -> Array | None:
@@ -270,7 +270,7 @@ class _BagImport:
             n_without += track.first.number is None
             finger = f"finger{n_without if track.first.number is None else number}"
             times = track.times(clock)
-            if times is None:  # the bag's times do not increase either: Tactile names the place
+            if times is None:  # the bag's times do not increase either: Tactile names the index
                 times = np.array([stamps[-1] for stamps in track.stamps])
             sensors = sensors_of(track.first, "count")
             parts = xela_models.split(track.first.model, np.array(track.readings))

@@ -10,7 +10,7 @@ import numpy as np
 
 from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
-from holdfast.io.importers.array_tables import StoredArray, arrays_of_records, joined_axes
+from holdfast.io.importers.array_conversion import StoredArray, arrays_of_records, joined_axes
 from holdfast.io.importers.table import first_texts
 from holdfast_ros.bags import Bag
 
@@ -64,14 +64,14 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     found: dict[str, StoredArray] = {}
     for name, own in records.items():
         arrays = arrays_of_records(own)
-        for place in [place for place in arrays if place.endswith("bag_time")]:
-            start = place.removesuffix("bag_time")
+        for key in [key for key in arrays if key.endswith("bag_time")]:
+            start = key.removesuffix("bag_time")
             header = arrays.get(f"{start}stamp")
-            times = arrays.pop(place)
+            times = arrays.pop(key)
             is_good = header is not None and bool((np.diff(header.read(), prepend=0) > 0).all())
             arrays[f"{start}time"] = header if header is not None and is_good else times
-        arrays = {place: one for place, one in arrays.items() if not place.endswith("stamp")}
-        found |= {f"{name}/{place}": one for place, one in arrays.items()}
+        arrays = {key: one for key, one in arrays.items() if not key.endswith("stamp")}
+        found |= {f"{name}/{key}": one for key, one in arrays.items()}
     return found
 
 
@@ -121,7 +121,7 @@ def point_fields(message: Mapping[str, Any]) -> dict[str, Any]:
     points = np.frombuffer(message["data"].tobytes(), kind, n)
     joined = joined_axes({name: points[name] for name in kind.names or ()})
     vectors = [name for name, values in joined.items() if values.ndim > 1]
-    # The place of a point is no reading where it has another vector.
+    # The position of a point is no reading where it has another vector.
     if len(vectors) > 1:
         joined.pop("xyz", None)
     return joined

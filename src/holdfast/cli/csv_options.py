@@ -53,7 +53,7 @@ class CsvOptions:
             ValueError: an option is given for a recording of holdfast, or for a live source.
         """
         from holdfast.devices.uri import is_uri
-        from holdfast.io.recording_files import SUFFIXES
+        from holdfast.io.file_formats import SUFFIXES
 
         suffix = Path(source).suffix.lower()
         if not self.sensor and self.columns is None:

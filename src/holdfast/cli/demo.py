@@ -80,10 +80,10 @@ def demo(
     from holdfast.cli.detect.output import watch
     from holdfast.live.web.serving import show_recording
     from holdfast.parallel import Engine
+    from holdfast.simulated_grasps import path_of, plan_grasps, simulate_grasps
     from holdfast.training import Setting, train
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.twin.objects import OTHER_OBJECTS
-    from holdfast.twin_recordings import path_of, plan_grasps, simulate_grasps
     from holdfast.web.server import has_browser
 
     grasps = plan_grasps(
@@ -130,8 +130,8 @@ def show_real_recording(speed: float) -> dict[str, Any]:
     It needs the core alone.
     """
     from holdfast.cli.detect.output import watch
+    from holdfast.demo_data import BOX_SLIPS
     from holdfast.io import load_recording
-    from holdfast.recorded import BOX_SLIPS
 
     summary = watch("builtin:any", BOX_SLIPS, speed)
     labels = load_recording(BOX_SLIPS).modules["finger1"].labels

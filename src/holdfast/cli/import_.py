@@ -13,7 +13,7 @@ from holdfast.cli.terminal.console import print_json, print_line, print_message,
 from holdfast.cli.terminal.progress import progress
 
 if TYPE_CHECKING:
-    from holdfast.recording_import import ImportResult, ImportTask
+    from holdfast.import_tasks import ImportResult, ImportTask
 
 
 class RecordingFormat(StrEnum):
@@ -58,7 +58,7 @@ class FormatOptions:
         Raises:
             ValueError: a module has two sensors, or a sensor is unknown or not valid.
         """
-        from holdfast.recording_import import ImportTask
+        from holdfast.import_tasks import ImportTask
 
         task = ImportTask(
             out, self.data_format, parse_sensors(self.sensor or ()), self.columns,
@@ -96,7 +96,7 @@ def import_(
         --columns 'time=t:ms,taxels=m{taxel}{axis}'
       holdfast import cut.mcap recovered/
     """
-    from holdfast.recording_import import import_all
+    from holdfast.import_tasks import import_all
 
     engine, task = parallel.start(), options.task(out, force=force)
     result = import_all(path, task, engine, notify=print_message, steps=progress)

@@ -66,9 +66,9 @@ def record(
     """
     from holdfast.cli.terminal.progress import StatusLine, format_size
     from holdfast.devices.sources import open_source
-    from holdfast.live import source_recording as library
+    from holdfast.live import recorder_setup as library
+    from holdfast.live.arrival_buffer import marker_text
     from holdfast.live.camera import camera_of
-    from holdfast.live.recording_buffer import marker_text
 
     check_seconds(seconds)
     check_speed(source, speed)

@@ -1,6 +1,7 @@
 """Files of recordings (Parquet, MCAP) and of labels, datasets, and import of other formats."""
 
 from holdfast.io.dataset import Dataset, load_dataset
+from holdfast.io.file_formats import load_recording, read_chunks, save_recording
 from holdfast.io.importers import FORMATS, import_recordings
 from holdfast.io.label_files import (
     LabelFile,
@@ -10,7 +11,6 @@ from holdfast.io.label_files import (
     load_labels,
     save_labels,
 )
-from holdfast.io.recording_files import load_recording, read_chunks, save_recording
 
 __all__ = [
     "FORMATS",

@@ -169,13 +169,13 @@ class _Ros1Bytes:
 
     def __init__(self, data: bytes) -> None:
         self._data = data
-        self._place = 0
+        self._offset = 0
         self._byte_order: Literal["little", "big"] = "little"
         self._dtypes = _LITTLE_ENDIAN
 
     @property
     def n_left(self) -> int:
-        return len(self._data) - self._place
+        return len(self._data) - self._offset
 
     def array(self, kind: str, n: int) -> npt.NDArray[Any]:
         dtype = self._dtypes[kind]
@@ -183,16 +183,16 @@ class _Ros1Bytes:
             self._align(dtype.itemsize)
         if n * dtype.itemsize > self.n_left:
             raise ValueError(f"the message is cut: {n} {kind} expected, {self.n_left} bytes left")
-        values = np.frombuffer(self._data, dtype, n, self._place) if n else np.empty(0, dtype)
-        self._place += values.nbytes
+        values = np.frombuffer(self._data, dtype, n, self._offset) if n else np.empty(0, dtype)
+        self._offset += values.nbytes
         return values.astype(_NATIVE[kind])
 
     def length(self) -> int:
         self._align(4)
         if self.n_left < 4:
             raise ValueError(f"the message is cut: 1 uint32 expected, {self.n_left} bytes left")
-        start, self._place = self._place, self._place + 4
-        return int.from_bytes(self._data[start : self._place], self._byte_order)
+        start, self._offset = self._offset, self._offset + 4
+        return int.from_bytes(self._data[start : self._offset], self._byte_order)
 
     def text(self) -> str:
         return self.array("uint8", self.length()).tobytes().decode()
@@ -214,10 +214,10 @@ class _CdrBytes(_Ros1Bytes):
             raise ValueError("no CDR message")
         if not data[1]:
             self._byte_order, self._dtypes = "big", _BIG_ENDIAN
-        self._place = 4
+        self._offset = 4
 
     def text(self) -> str:
         return super().text().removesuffix("\x00")
 
     def _align(self, size: int) -> None:
-        self._place = min(self._place + -(self._place - 4) % size, len(self._data))
+        self._offset = min(self._offset + -(self._offset - 4) % size, len(self._data))

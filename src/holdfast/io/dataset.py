@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import overload
 
 from holdfast.errors import RecordingError
-from holdfast.io.recording_files import SUFFIXES, is_recording, load_recording
+from holdfast.io.file_formats import SUFFIXES, is_recording, load_recording
 from holdfast.recordings import Recording
 
 
@@ -64,23 +64,23 @@ def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = 
     Raises:
         RecordingError: the folder does not exist, or has no recording.
     """
-    place = Path(folder)
-    if place.is_file():
-        return Dataset([place], labels=labels, in_contact=in_contact)
-    if not place.is_dir():
-        raise RecordingError(f"there is no folder {place}; a folder of recordings expected")
+    path = Path(folder)
+    if path.is_file():
+        return Dataset([path], labels=labels, in_contact=in_contact)
+    if not path.is_dir():
+        raise RecordingError(f"there is no folder {path}; a folder of recordings expected")
     by_name: dict[str, Path] = {}
     # The preferred suffix comes last and replaces others. A file that is being written is hidden.
     for suffix in reversed(SUFFIXES):
-        by_name.update({p.stem: p for p in place.glob(f"[!.]*{suffix}") if is_recording(p)})
+        by_name.update({p.stem: p for p in path.glob(f"[!.]*{suffix}") if is_recording(p)})
     if not by_name:
-        n_entries = len(list(place.iterdir()))
+        n_entries = len(list(path.iterdir()))
         # As the folder of `holdfast demo`, whose recordings are one level deeper.
-        deeper = (p.parent for p in sorted(place.glob("[!.]*/*")) if is_recording(p))
+        deeper = (p.parent for p in sorted(path.glob("[!.]*/*")) if is_recording(p))
         found = next(deeper, None)
         advice = f"{found} has some" if found else "`holdfast import` makes them"
         raise RecordingError(
-            f"no recording in {place} ({n_entries} other entries); files "
+            f"no recording in {path} ({n_entries} other entries); files "
             f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: {advice}"
         )
     paths = [by_name[name] for name in sorted(by_name)]

@@ -133,9 +133,9 @@ def read_foreign_poses(
 def read_stickers(
     path: Path, fps: float | None = None
 ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], dict[int, npt.NDArray[np.float64]]]:
-    """Return times and brightness (n,) of the pictures of a video, and places of its stickers.
+    """Return times and brightness (n,) of the pictures of a video, and poses of its stickers.
 
-    They are as `holdfast.io.stickers.sticker_places` yields them, in a child process.
+    They are as `holdfast.io.stickers.sticker_poses` yields them, in a child process.
 
     Raises:
         RecordingError: as `read_foreign`.
@@ -145,21 +145,21 @@ def read_stickers(
     times: list[npt.NDArray[np.float64]] = []
     levels: list[npt.NDArray[np.float64]] = []
     parts: list[dict[int, npt.NDArray[np.float64]]] = []
-    for document, (part_times, part_levels, *places) in _values("stickers", path, {"fps": fps}):
+    for document, (part_times, part_levels, *poses) in _values("stickers", path, {"fps": fps}):
         numbers = msgspec.json.decode(document, type=list[int])
         times.append(part_times)
         levels.append(part_levels)
-        parts.append(dict(zip(numbers, places, strict=True)))
+        parts.append(dict(zip(numbers, poses, strict=True)))
     # A part names only the stickers that are seen in it.
     unseen = [np.full((len(part), 2, 3), np.nan) for part in times]
-    places_of = {
+    poses_of = {
         number: np.concatenate(
             [part.get(number, gap) for part, gap in zip(parts, unseen, strict=True)]
         )
         for number in sorted({number for part in parts for number in part})
     }
     empty = np.zeros(0)
-    return np.concatenate([empty, *times]), np.concatenate([empty, *levels]), places_of
+    return np.concatenate([empty, *times]), np.concatenate([empty, *levels]), poses_of
 
 
 def limits() -> dict[str, bool]:
@@ -395,13 +395,13 @@ def poses_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 
 
 def stickers_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
-    """Yield the places of stickers in a video, part by part."""
-    from holdfast.io.stickers import sticker_places
+    """Yield the poses of stickers in a video, part by part."""
+    from holdfast.io.stickers import sticker_poses
 
     import_module("cv2")
     _limit_memory(request)
-    for times, levels, places in sticker_places(path, request.options["fps"]):
-        yield msgspec.json.encode(list(places)), [times, levels, *places.values()]
+    for times, levels, poses in sticker_poses(path, request.options["fps"]):
+        yield msgspec.json.encode(list(poses)), [times, levels, *poses.values()]
 
 
 _TASKS: Mapping[str, Callable[[Path, _Request], Iterator[tuple[bytes, Arrays]]]] = {

@@ -186,11 +186,11 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
         for number, row in enumerate(
             csv.DictReader(StringIO(text)), start=2
         ):  # row 1 is the header
-            place = f"{path}, row {number}"
+            row_name = f"{path}, row {number}"
             # The cause, the last column, may be empty or missing.
             if missing := [name for name in CSV_COLUMNS[:4] if not row.get(name)]:
                 raise RecordingError(
-                    f"{place}: no {', '.join(missing)}; the columns are {','.join(CSV_COLUMNS)}"
+                    f"{row_name}: no {', '.join(missing)}; the columns are {','.join(CSV_COLUMNS)}"
                 )
             finger, start, end, state, cause = ((row.get(k) or "").strip() for k in CSV_COLUMNS)
             try:
@@ -198,7 +198,7 @@ def labels_from_csv(path: str | Path, *, author: str = "") -> dict[str, tuple[La
                 contact = ContactState(state.upper())
                 label = Label(float(start), float(end), contact, label_cause, "csv", 1.0, author)
             except ValueError as problem:
-                raise RecordingError(f"{place}: {problem}") from problem
+                raise RecordingError(f"{row_name}: {problem}") from problem
             labels.setdefault(cell_text(finger), []).append(label)
     except OSError as error:
         raise RecordingError(f"cannot read {path}: {error.strerror}") from error

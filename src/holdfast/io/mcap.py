@@ -17,8 +17,8 @@ from mcap.writer import MCAP0_MAGIC as MAGIC
 from holdfast.errors import RecordingError
 from holdfast.files import whole_file
 from holdfast.io.header import Header, decode_header, header_of
+from holdfast.io.mcap_chunks import check_checksums, has_end, read_chunks, records_in
 from holdfast.io.mcap_messages import decode_samples, decode_text, number_of_type
-from holdfast.io.mcap_records import check_checksums, has_end, read_chunks, records_in
 from holdfast.io.mcap_writer import (
     HEADER_TOPIC,
     LIBRARY,

@@ -20,7 +20,7 @@ from holdfast.io.mcap_messages import (
     samples_schema,
     samples_type,
 )
-from holdfast.io.output_stream import UnbufferedStream, open_alone
+from holdfast.io.output_stream import UnbufferedStream, open_locked
 from holdfast.io.timed_arrays import TACTILE, time_spans
 from holdfast.openable import Closable
 from holdfast.sensors import Sensor
@@ -252,7 +252,7 @@ class MessageLog:
         self._chunk_span = (np.inf, -np.inf)
         self.closed = False
         with _disk_errors(path):
-            self._file = open_alone(path, force=force)
+            self._file = open_locked(path, force=force)
             self._stream = UnbufferedStream(self._file)
             self._writer = Writer(
                 cast("IO[bytes]", self._stream),

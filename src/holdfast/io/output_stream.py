@@ -9,7 +9,7 @@ from holdfast.errors import OutputError
 from holdfast.files import check_regular, lock
 
 
-def open_alone(path: Path, *, force: bool) -> FileIO:
+def open_locked(path: Path, *, force: bool) -> FileIO:
     """Open a file for writing, and lock it until it is closed, where the system has locks.
 
     A file that another program is recording keeps its content.

@@ -179,10 +179,10 @@ def is_foreign(path: Path) -> bool:
 
 def write_checksum(path: Path) -> None:
     """Replace the blank checksum in the footer by the checksum of the file."""
-    place = _checksum_place(path)
-    checksum = _checksum(path, place)
+    offset = _checksum_offset(path)
+    checksum = _checksum(path, offset)
     with path.open("r+b") as file:
-        file.seek(place)
+        file.seek(offset)
         file.write(checksum)
 
 
@@ -204,11 +204,11 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
         )
     # The checksum comes first: Arrow may end the process for a file that is damaged.
     try:
-        place = _checksum_place(path)
+        offset = _checksum_offset(path)
         with path.open("rb") as file:
-            file.seek(place)
+            file.seek(offset)
             stored = file.read(len(BLANK_CHECKSUM))
-        if stored != _checksum(path, place):
+        if stored != _checksum(path, offset):
             raise RecordingError(f"{path} is damaged: its content does not match its checksum")
     except RecordingError:
         if is_foreign(path):
@@ -224,8 +224,8 @@ def _open(path: Path) -> tuple[Header, pq.ParquetFile]:
     return decode_header(header, path), table
 
 
-def _checksum_place(path: Path) -> int:
-    """Return the place of the first character of the checksum in the file."""
+def _checksum_offset(path: Path) -> int:
+    """Return the offset of the first character of the checksum in the file."""
     start, footer = _read_footer(path)
     # In the thrift encoding of the footer a value follows its key: field header, varint length.
     mark = CHECKSUM_KEY.encode() + b"\x18" + bytes([len(BLANK_CHECKSUM)])
@@ -234,23 +234,23 @@ def _checksum_place(path: Path) -> int:
     return start + footer.index(mark) + len(mark)
 
 
-def _checksum(path: Path, place: int) -> bytes:
-    """Return the blake2b-256 of all bytes of the file, with a blank checksum at `place`."""
+def _checksum(path: Path, offset: int) -> bytes:
+    """Return the blake2b-256 of all bytes of the file, with a blank checksum at `offset`."""
     state = hashlib.blake2b(digest_size=len(BLANK_CHECKSUM) // 2)
-    n_left = place
+    n_left = offset
     with path.open("rb") as file:
         while n_left and (block := file.read(min(BLOCK_SIZE, n_left))):
             state.update(block)
             n_left -= len(block)
         state.update(BLANK_CHECKSUM.encode())
-        file.seek(place + len(BLANK_CHECKSUM))
+        file.seek(offset + len(BLANK_CHECKSUM))
         while block := file.read(BLOCK_SIZE):
             state.update(block)
     return state.hexdigest().encode()
 
 
 def _read_footer(path: Path) -> tuple[int, bytes]:
-    """Return the place of the footer in a Parquet file, and its bytes."""
+    """Return the offset of the footer in a Parquet file, and its bytes."""
     size = path.stat().st_size
     with path.open("rb") as file:
         file.seek(max(0, size - FOOTER_END_SIZE))
@@ -272,8 +272,8 @@ def _schema(specs: list[ArraySpec]) -> pa.Schema:
             taxels = [f"t{number:0{width}d}" for number in taxel_numbers(range(n_taxels))]
             components = [f"{taxel}.{axis}" for taxel, axis in product(taxels, "xyz")]
         else:
-            places = product(*(range(size) for size in spec.shape))
-            components = [".".join(map(str, place)) for place in places]
+            indices = product(*(range(size) for size in spec.shape))
+            components = [".".join(map(str, index)) for index in indices]
         # A value of one number has no component, and its column no end.
         names = [f"{spec.column}.{end}" if end else spec.column for end in components]
         fields += [(name, arrow_type(spec.number)) for name in names]

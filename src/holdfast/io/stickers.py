@@ -2,7 +2,7 @@
 
 A sticker is found by its pattern, and then followed: its first picture is laid over each later one
 until both agree (inverse compositional alignment, Baker and Matthews 2004). All its edges count, so
-the place is exact to a few hundredths of a pixel, where single corners are five times worse.
+the position is exact to a few hundredths of a pixel, where single corners are five times worse.
 """
 
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 MAX_STAMPS = 50_000_000
 """Largest file of times of pictures [bytes]: four million pictures."""
 PICTURES_PER_PART = 60
-"""Pictures after which the places are passed on."""
+"""Pictures after which the poses are passed on."""
 SEARCH_PICTURES, RARE_SEARCH_PICTURES = 3, 60
 """A search through the whole picture takes as long as following 20 stickers: it is done once in
 this number of pictures, with a sticker that is lost, and without."""
@@ -61,10 +61,10 @@ def picture_stamps(video: Path) -> Array | None:
     return stamps
 
 
-def sticker_places(
+def sticker_poses(
     path: Path, fps: float | None = None
 ) -> Iterator[tuple[Array, Array, dict[int, Array]]]:
-    """Yield times, brightness and places of all stickers, part by part.
+    """Yield times, brightness and poses of all stickers, part by part.
 
     Args:
         path: of the video.
@@ -93,7 +93,7 @@ def sticker_places(
     search = _Search()
     times: list[float] = []
     levels: list[float] = []
-    places: list[dict[int, Array]] = []
+    poses: list[dict[int, Array]] = []
     n = 0
     while film.grab():
         stamp = film.get(cv2.CAP_PROP_POS_MSEC) / 1000 if fps is None else n / fps
@@ -105,20 +105,20 @@ def sticker_places(
         times.append(stamp)
         seen = search.next(np.ascontiguousarray(picture[:, :, 1]))  # green is the sharpest
         levels.append(float(picture[::8, ::8, 1].mean()))
-        places.append({k: place - [[0, 0, middle[0]], [0, 0, middle[1]]] for k, place in seen})
+        poses.append({k: pose - [[0, 0, middle[0]], [0, 0, middle[1]]] for k, pose in seen})
         if len(times) > PICTURES_PER_PART:  # the last one stays, as the time before the next
-            yield _part(times[:-1], levels[:-1], places[:-1])
-            times, levels, places = times[-1:], levels[-1:], places[-1:]
+            yield _part(times[:-1], levels[:-1], poses[:-1])
+            times, levels, poses = times[-1:], levels[-1:], poses[-1:]
     if times:
-        yield _part(times, levels, places)
+        yield _part(times, levels, poses)
 
 
 def _part(
-    times: list[float], levels: list[float], places: list[dict[int, Array]]
+    times: list[float], levels: list[float], poses: list[dict[int, Array]]
 ) -> tuple[Array, Array, dict[int, Array]]:
     unseen = np.full((2, 3), np.nan)
-    numbers = sorted({k for seen in places for k in seen})
-    tracks = {k: np.array([s.get(k, unseen) for s in places]) for k in numbers}
+    numbers = sorted({k for seen in poses for k in seen})
+    tracks = {k: np.array([s.get(k, unseen) for s in poses]) for k in numbers}
     return np.array(times), np.array(levels), tracks
 
 
@@ -134,7 +134,7 @@ class _Search:
         self._n = 0
 
     def next(self, grey: Picture) -> list[tuple[int, Array]]:
-        """Return number and place of the stickers in the next picture."""
+        """Return number and pose of the stickers in the next picture."""
         lost = [k for k, sticker in self._followed.items() if not sticker.follow(grey)]
         if self._n % (SEARCH_PICTURES if lost else RARE_SEARCH_PICTURES) == 0:
             corners, numbers, _ = self._finder.detectMarkers(grey)
@@ -146,14 +146,14 @@ class _Search:
                     self._followed[k].start(outline[0])
                     self._followed[k].follow(grey)
         self._n += 1
-        return [(k, sticker.place) for k, sticker in self._followed.items() if sticker.is_seen]
+        return [(k, sticker.pose) for k, sticker in self._followed.items() if sticker.is_seen]
 
 
 class _Sticker:
     """A sticker that is followed from picture to picture.
 
     Attributes:
-        place: (2, 3) affine map from its plane to the picture [pixels].
+        pose: (2, 3) affine map from its plane to the picture [pixels].
         is_seen: whether it is in the last picture.
     """
 
@@ -169,39 +169,39 @@ class _Sticker:
         self._solve = np.linalg.pinv(np.stack([part.ravel() for part in steepest], axis=1))
 
     def start(self, corners: Array) -> None:
-        """Take the place from the corners (4, 2) [pixels]."""
+        """Take the pose from the corners (4, 2) [pixels]."""
         plane = np.column_stack([CORNERS, np.ones(4)])
-        self.place: Array = np.linalg.lstsq(plane, corners.astype(np.float64), rcond=None)[0].T
+        self.pose: Array = np.linalg.lstsq(plane, corners.astype(np.float64), rcond=None)[0].T
 
     def follow(self, grey: Picture) -> bool:
-        """Find the sticker near its last place; return whether it is there."""
-        place = self.place
+        """Find the sticker near its last pose; return whether it is there."""
+        pose = self.pose
         for _ in range(MAX_ROUNDS):
-            now = self._sample(grey, place)
+            now = self._sample(grey, pose)
             step = self._solve @ (now - self._template)
             change = np.eye(3)
             change[:2] += step.reshape(2, 3)
-            # The step moves the template to the picture; the place moves the other way.
-            place = place @ np.linalg.inv(change)
+            # The step moves the template to the picture; the pose moves the other way.
+            pose = pose @ np.linalg.inv(change)
             if np.abs(step).max() < SETTLED:
                 break
         likeness = float(now @ self._template) / len(now)
-        size = abs(np.linalg.det(place[:, :2]))
+        size = abs(np.linalg.det(pose[:, :2]))
         # In 8 x 8 pixels, the 6 x 6 cells of a pattern are hardly seen.
         self.is_seen = likeness > MIN_LIKENESS and 64 < size < grey.size / 4
         if self.is_seen:
-            self.place = place
+            self.pose = pose
         return self.is_seen
 
-    def _sample(self, grey: Picture, place: Array | None = None) -> Array:
+    def _sample(self, grey: Picture, pose: Array | None = None) -> Array:
         """Return the grey values on the grid of the template, with mean 0 and variance 1."""
         import cv2
 
-        place = self.place if place is None else place
+        pose = self.pose if pose is None else pose
         grid = np.array([[self._scale, 0, 0], [0, self._scale, 0], [0, 0, 1.0]])
         grid[:2, 2] = TEMPLATE_SIDE * (0.5 / N_POINTS - 0.5)
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
-        seen = cv2.warpAffine(grey, place @ grid, (N_POINTS, N_POINTS), flags=flags)
+        seen = cv2.warpAffine(grey, pose @ grid, (N_POINTS, N_POINTS), flags=flags)
         values = seen.astype(np.float64).ravel()
         # A plain area has no variance: its noise must not become a pattern.
         return np.asarray((values - values.mean()) / max(values.std(), 1.0))

@@ -10,9 +10,9 @@ import msgspec
 from holdfast.errors import HoldfastError, OutputError, RecordingError
 from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.io import labels_to_csv, load_dataset, load_recording
+from holdfast.io.file_formats import SUFFIXES
 from holdfast.io.header import label_of
 from holdfast.io.label_files import SUFFIX, labels_for, labels_from_csv, labels_path, load_labels
-from holdfast.io.recording_files import SUFFIXES
 from holdfast.labelling.review.confidence import doubtful, state_name
 from holdfast.labelling.review.content import label_seconds
 from holdfast.labelling.rules.forces import evidence_of_contact

@@ -26,11 +26,11 @@ def sticker_sheet() -> bytes:
         "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
         f"<< /Length {len(drawing)} >>\nstream\n{drawing}\nendstream",
     )
-    text, places = "%PDF-1.4\n", []
+    text, offsets = "%PDF-1.4\n", []
     for k, content in enumerate(objects, 1):
-        places.append(len(text))
+        offsets.append(len(text))
         text += f"{k} 0 obj\n{content}\nendobj\n"
-    table = "".join(f"{place:010d} 00000 n \n" for place in places)
+    table = "".join(f"{offset:010d} 00000 n \n" for offset in offsets)
     n = len(objects) + 1
     text += f"xref\n0 {n}\n0000000000 65535 f \n{table}trailer\n<< /Size {n} /Root 1 0 R >>\n"
     return f"{text}startxref\n{text.index('xref')}\n%%EOF\n".encode("ascii")

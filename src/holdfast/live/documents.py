@@ -47,10 +47,10 @@ def document_type(
         (field.name, _nullable(field.type) if nullable(field.name) else field.type)
         for field in fields(value)
     ]
-    place = len(own) if at is None else at
+    index = len(own) if at is None else at
     return msgspec.defstruct(
         name,
-        [*own[:place], *added, *own[place:]],
+        [*own[:index], *added, *own[index:]],
         namespace={"__doc__": description},
         module=__name__,
         frozen=True,

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 
 from holdfast.errors import SourceError
-from holdfast.live.recording_buffer import ModuleBuffer
-from holdfast.live.source_recording import EXTRA_TIME
+from holdfast.live.arrival_buffer import ModuleBuffer
+from holdfast.live.recorder_setup import EXTRA_TIME
 from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamUpdate
 from holdfast.recordings import Recording, Tactile
 from holdfast.training.own_handling import ENOUGH_HANDLING

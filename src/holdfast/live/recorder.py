@@ -13,7 +13,7 @@ from holdfast.contact import Fault
 from holdfast.devices.sources import Arrival
 from holdfast.errors import OutputError
 from holdfast.io.mcap_writer import RecordingWriter
-from holdfast.live.recording_buffer import RecordingBuffer
+from holdfast.live.arrival_buffer import ArrivalBuffer
 from holdfast.openable import Closable
 from holdfast.sensors import Sensor
 
@@ -150,7 +150,7 @@ class Recorder(Closable):
         self._fsync = fsync
         self._synced_at = time.monotonic()
         self._file_id = _file_id(self.path)  # a file of the same name is another file
-        self._buffer = RecordingBuffer(sensors)
+        self._buffer = ArrivalBuffer(sensors)
         # `put` and `add_marker` append, the thread of the recorder takes out.
         self._queue: deque[Arrival | _QueuedMarker] = deque()
         self._newest_time = math.nan

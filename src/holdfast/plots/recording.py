@@ -94,13 +94,13 @@ def plot_recording(
     rows = [row for row in ROW_HEIGHTS if not absent.get(row, False)]
     n_columns = 1 if len(curves) <= MAX_FINGERS_IN_COLUMN else 2
     figure, stacks = _stacks(curves, rows, n_columns)
-    for place, (name, axes) in enumerate(zip(fingers, stacks, strict=False)):
+    for index, (name, axes) in enumerate(zip(fingers, stacks, strict=False)):
         panels = dict(zip(rows, axes, strict=True))
         _draw_finger(panels, fingers[name], curves[name], origin)
         if decisions is not None:
             draw_slip_decisions(panels.get("slip"), panels["decision"], decisions.get(name))
-        _draw_markers(axes, recording, origin, named=place < n_columns)
-        if place + n_columns >= len(fingers):
+        _draw_markers(axes, recording, origin, named=index < n_columns)
+        if index + n_columns >= len(fingers):
             label = "time [s]" if origin == 0 else f"time since {origin:.3f} s [s]"
             add_labels(axes[-1], x=label)
     for axes in stacks[len(fingers) :]:

@@ -67,8 +67,8 @@ def plot_noise(noise: Mapping[str, npt.ArrayLike]) -> Figure:
         levels = np.asarray(values, dtype=np.float64)
         numbers = np.arange(len(levels))
         for axis, colour in enumerate(AXIS_COLOURS):
-            place = numbers + 0.27 * (axis - 1)
-            axes.bar(place, levels[:, axis], 0.25, color=colour, label="xyz"[axis])
+            x = numbers + 0.27 * (axis - 1)
+            axes.bar(x, levels[:, axis], 0.25, color=colour, label="xyz"[axis])
         axes.set_title(literal(name), fontsize=8, loc="left")
         axes.set_xticks(numbers, [str(taxel_number(i)) for i in numbers.tolist()], fontsize=6)
         axes.tick_params(axis="y", labelsize=6)
@@ -115,12 +115,12 @@ def plot_hand(hand: Hand) -> Figure:
 
 
 def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None:
-    places = sensor.positions * MM_PER_M
-    size = float(np.ptp(places, axis=0).max()) or 10.0
+    points = sensor.positions * MM_PER_M
+    size = float(np.ptp(points, axis=0).max()) or 10.0
     normals = sensor.rotations[:, :, 2] * 0.16 * size
-    drawn = np.vstack([places, places + normals, np.zeros(3), np.full(3, 0.36 * size)])
-    axes.scatter(*places.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
-    axes.quiver(*places.T, *normals.T, color="#444444", linewidth=0.8, arrow_length_ratio=0.3)
+    drawn = np.vstack([points, points + normals, np.zeros(3), np.full(3, 0.36 * size)])
+    axes.scatter(*points.T, c=colours, s=22, depthshade=False, edgecolors="black", linewidths=0.4)
+    axes.quiver(*points.T, *normals.T, color="#444444", linewidth=0.8, arrow_length_ratio=0.3)
     for axis, (name, colour) in enumerate(zip("xyz", AXIS_COLOURS, strict=True)):
         arrow = np.zeros(3)
         arrow[axis] = 0.3 * size
@@ -139,17 +139,17 @@ def _draw_space(axes: Axes3D, sensor: Sensor, colours: Array, up: Array) -> None
 
 
 def _draw_front(axes: Axes, sensor: Sensor, colours: Array, view: tuple[Array, Array]) -> None:
-    places = sensor.positions @ np.transpose(view) * MM_PER_M
-    size = float(np.ptp(places, axis=0).max()) or 10.0
+    points = sensor.positions @ np.transpose(view) * MM_PER_M
+    size = float(np.ptp(points, axis=0).max()) or 10.0
     for axis, length, colour in ((2, 0.13, "#444444"), (0, 0.07, AXIS_COLOURS[0])):
         arrows = sensor.rotations[:, :, axis] @ np.transpose(view) * length * size
         axes.quiver(
-            *places.T, *arrows.T, angles="xy", scale_units="xy", scale=1, width=0.004, color=colour
+            *points.T, *arrows.T, angles="xy", scale_units="xy", scale=1, width=0.004, color=colour
         )
     axes.scatter(
-        places[:, 0], places[:, 1], c=colours, s=130, edgecolors="black", linewidths=0.6, zorder=2
+        points[:, 0], points[:, 1], c=colours, s=130, edgecolors="black", linewidths=0.6, zorder=2
     )
-    for k, (x, y) in enumerate(places):
+    for k, (x, y) in enumerate(points):
         # Numbers are readable on dark and on light colours.
         ink = "white" if colours[k, :3].mean() < 0.55 else "black"
         axes.text(x, y, str(taxel_number(k)), ha="center", va="center", fontsize=6.5, color=ink)

@@ -154,7 +154,7 @@ def add_labels(axes: Axes, x: str | None = None, y: str | None = None) -> None:
 def add_legend(
     figure: Figure,
     handles: Sequence[Artist],
-    place: Literal["outside upper center", "outside lower center"] = "outside upper center",
+    location: Literal["outside upper center", "outside lower center"] = "outside upper center",
     per_row: int = 8,
 ) -> None:
     """Add a legend above or below all axes."""
@@ -163,7 +163,7 @@ def add_legend(
     # Lines of about equal length, not a full one and a rest.
     n_lines = -(-len(handles) // per_row)
     figure.legend(
-        handles=handles, loc=place, ncols=-(-len(handles) // n_lines),
+        handles=handles, loc=location, ncols=-(-len(handles) // n_lines),
         fontsize=FONT_SIZE, frameon=False, handlelength=2.8, columnspacing=1.3, borderaxespad=0.3,
     )  # fmt: skip
 

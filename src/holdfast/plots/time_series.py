@@ -144,8 +144,8 @@ def _first_of_each(values: Array, extremes: Array, edges: StateCodes) -> StateCo
 
     Without one, because the extreme is NaN, it is that of a later stretch, or the last edge.
     """
-    places = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
-    return np.append(places, len(values))[np.searchsorted(places, edges[:-1])]
+    indices = np.flatnonzero(values == np.repeat(extremes, np.diff(edges)))
+    return np.append(indices, len(values))[np.searchsorted(indices, edges[:-1])]
 
 
 def draw_curve(

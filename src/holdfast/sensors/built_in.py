@@ -166,7 +166,7 @@ SENSORS = {
     # Pitches of XELA's URDF files of the uSPa44 and the uSPa46.
     "uskin-4x4": cache(partial(_grid, "uskin-4x4", (4, 4), (4.667e-3, 4.667e-3), 100.0, UINT16)),
     "uskin-4x6": cache(partial(_grid, "uskin-4x6", (4, 6), (7.24e-3, 7.17e-3), 100.0, UINT16)),
-    # 15 sections of fingers with a reading each; nominal places, 3 a finger.
+    # 15 sections of fingers with a reading each; nominal positions, 3 a finger.
     "gtac": cache(partial(_grid, "gtac", (3, 5), (25e-3, 25e-3), 150.0)),
     "anyskin": anyskin,
     # 3 x 3 pillars, which send newtons; nominal pitch.

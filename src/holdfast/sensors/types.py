@@ -1,4 +1,4 @@
-"""Types of sensors and hands: taxel poses, and places in the flat packet of a hand."""
+"""Types of sensors and hands: taxel poses, and indices in the flat packet of a hand."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields

@@ -50,10 +50,10 @@ def compute_decisions(model: Model, recording: Recording) -> Decisions:
         RecordingError: two fingers have the same readings.
         ModelError: the recording has other fingers or sensors.
     """
-    return judge(model, recording)[0]
+    return compute_decisions_and_tare(model, recording)[0]
 
 
-def judge(model: Model, recording: Recording) -> tuple[Decisions, bool]:
+def compute_decisions_and_tare(model: Model, recording: Recording) -> tuple[Decisions, bool]:
     """Return the decisions as `compute_decisions`, and whether the tare was taken under load.
 
     Raises:
@@ -242,7 +242,7 @@ def _evaluate_part(
 ) -> tuple[RecordingResults, "_Origin", list[Decisions]]:
     """Return results, where the recording comes from, and the decisions if they are kept."""
     (recording,) = part
-    decisions, loaded = judge(model, recording)
+    decisions, loaded = compute_decisions_and_tare(model, recording)
     known, tuned_on = was_trained_on(model, recording), was_tuned_on(model, recording)
     origin = _Origin(recording.readings_digest, loaded, known, tuned_on)
     return score_recording(decisions), origin, [decisions] if keep else []

@@ -34,7 +34,7 @@ from holdfast.training.dataset_scan import (
     scan_recording,
     show_nothing,
 )
-from holdfast.training.evaluation import combine_decisions, judge
+from holdfast.training.evaluation import combine_decisions, compute_decisions_and_tare
 from holdfast.training.finger_samples import FingerSamples, thin, thinning_step
 from holdfast.training.head_fits import missing_heads
 from holdfast.training.model_fit import (
@@ -442,7 +442,7 @@ def _score_out_of_fold(
         decisions = Decisions(name, {})
         # A model of other fingers cannot decide about this recording, and refuses it.
         if ANY_FINGER in model.fingers or set(model.fingers) & set(recording.modules):
-            decisions, has_loaded_tare = judge(model, recording)
+            decisions, has_loaded_tare = compute_decisions_and_tare(model, recording)
             loaded |= has_loaded_tare
         by_model.append(decisions)
     combined = Decisions(name, {})

@@ -1,7 +1,7 @@
 """Closing of the fingers: a path of joint angles for each finger, from open to pressed in.
 
 The object stands upright before the palm, where the pads of thumb and fingers can reach it from
-two sides. The thumb cannot place its pad on the object when it pushes straight against the
+two sides. The thumb cannot put its pad on the object when it pushes straight against the
 fingers, or in the middle of the palm. So the direction of the grasp is turned, and the object is
 above the middle of the palm. The middle finger is opposite to the thumb, index and ring finger
 are above and below it: the three fingers share the load of the thumb.
@@ -84,19 +84,19 @@ def closing_path(item: GraspObject) -> ClosingPath:
     touch = int(np.abs(PATH_GAPS).argmin())
     joints = np.empty((len(FINGERS), len(PATH_GAPS), 4))
     misses, cosines = np.empty(len(FINGERS)), np.empty(len(FINGERS))
-    for place, finger in enumerate(FINGERS):
+    for index, finger in enumerate(FINGERS):
         push, points = aims_of(item, finger)
         # Each point is solved from the last, so that the joints never jump; the first from itself,
         # until it no longer depends on the guess.
         is_thumb = finger == "thumb"
         guess = np.array([1.2, 0.4, 0.2, 0.4] if is_thumb else [0.0, 0.3, 0.6, 0.5])
         for _ in range(N_SETTLE_SOLUTIONS):
-            guess = _solve(hand, place, points[0], push, guess)
+            guess = _solve(hand, index, points[0], push, guess)
         for k, point in enumerate(points):
-            joints[place, k] = guess = _solve(hand, place, point, push, guess)
-        pad, normal = _pad(hand, place, joints[place, touch])
-        misses[place] = np.linalg.norm(pad - points[touch])
-        cosines[place] = normal @ push
+            joints[index, k] = guess = _solve(hand, index, point, push, guess)
+        pad, normal = _pad(hand, index, joints[index, touch])
+        misses[index] = np.linalg.norm(pad - points[touch])
+        cosines[index] = normal @ push
     worst = int(np.argmax(np.maximum(misses / MAX_MISS, (1 - cosines) / (1 - MIN_PAD_COSINE))))
     if misses[worst] > MAX_MISS or cosines[worst] < MIN_PAD_COSINE:
         off = np.degrees(np.arccos(np.clip(cosines[worst], -1.0, 1.0)))
@@ -133,29 +133,29 @@ def object_pose(item: GraspObject) -> tuple[Array, float]:
 _FIRST = np.array([JOINTS[finger] for finger in FINGERS], np.intc)
 
 
-def _solve(hand: HandModel, place: int, point: Array, push: Array, guess: Array) -> Array:
-    first = JOINTS[FINGERS[place]]
+def _solve(hand: HandModel, index: int, point: Array, push: Array, guess: Array) -> Array:
+    first = JOINTS[FINGERS[index]]
     limits = hand.limits()[first : first + 4]
     low, high = limits[:, 0] + JOINT_MARGIN, limits[:, 1] - JOINT_MARGIN
 
     # Three unknown angles more than a point has coordinates: the normal, and a joint that stays
     # where it is, decide among the solutions that reach the point.
     def residuals(joints: Array) -> Array:
-        pad, normal = _pad(hand, place, joints)
+        pad, normal = _pad(hand, index, joints)
         turned = NORMAL_WEIGHT * (normal - push)
         return np.concatenate([pad - point, turned, REST_WEIGHT * (joints - guess)])
 
     return np.asarray(least_squares(residuals, np.clip(guess, low, high), bounds=(low, high)).x)
 
 
-def _pad(hand: HandModel, place: int, joints: Array) -> tuple[Array, Array]:
+def _pad(hand: HandModel, index: int, joints: Array) -> tuple[Array, Array]:
     """Return middle and normal of the pad in the palm."""
-    first = JOINTS[FINGERS[place]]
+    first = JOINTS[FINGERS[index]]
     hand.data.qpos[first : first + 4] = joints
     mujoco.mj_kinematics(hand.model, hand.data)
     palm = hand.data.xmat[hand.model.body("palm").id].reshape(3, 3)
-    turn = hand.data.xmat[hand.tips[place]].reshape(3, 3)
-    pad = hand.data.xpos[hand.tips[place]] + turn @ (MOUNTS[place] + np.array(PAD_MIDDLE))
+    turn = hand.data.xmat[hand.tips[index]].reshape(3, 3)
+    pad = hand.data.xpos[hand.tips[index]] + turn @ (MOUNTS[index] + np.array(PAD_MIDDLE))
     return palm.T @ pad, palm.T @ turn[:, 0]
 
 
@@ -185,13 +185,13 @@ class Pressing:
         error = target - joints
         self._pressing = np.zeros(N_JOINTS)
         self._finger = np.zeros(N_JOINTS, dtype=np.intp)
-        for place, finger in enumerate(FINGERS):
+        for index, finger in enumerate(FINGERS):
             joints_of_finger = slice(JOINTS[finger], JOINTS[finger] + 4)
             weighted = PROPORTIONAL[joints_of_finger] * ahead[joints_of_finger]
             length = float(weighted @ ahead[joints_of_finger])
             share = float(weighted @ error[joints_of_finger]) / length if length > 0 else 0.0
             self._pressing[joints_of_finger] = share * ahead[joints_of_finger]
-            self._finger[joints_of_finger] = place
+            self._finger[joints_of_finger] = index
 
     def displacement(self, scales: Array) -> Array:
         """Return the displacement of the set-points (16,) [rad] for force scales (4,)."""

@@ -195,8 +195,8 @@ def _link_xml(row: dict[str, str], rows: Rows) -> str:
 
 def _box_xml(sides: tuple[float, ...], middle: tuple[float, ...], mass: float) -> str:
     half = " ".join(f"{side / 2:.6g}" for side in sides)
-    place = " ".join(f"{value:.6g}" for value in middle)
-    return f'<geom type="box" size="{half}" pos="{place}" mass="{mass}"/>'
+    position = " ".join(f"{value:.6g}" for value in middle)
+    return f'<geom type="box" size="{half}" pos="{position}" mass="{mass}"/>'
 
 
 def object_xml(item: GraspObject) -> str:

@@ -119,8 +119,8 @@ class MagneticFaults:
         """
         field, found, load = self.field_at(times), {}, None
         numbers = np.rint(np.asarray(times) * 1e6).astype(np.int64)
-        for place, (name, sensor) in enumerate(sensors.items()):
-            unit = np.random.default_rng([seed, place])
+        for index, (name, sensor) in enumerate(sensors.items()):
+            unit = np.random.default_rng([seed, index])
             zero, shape = np.asarray(rest[name], dtype=np.float64), (sensor.n_taxels, 3)
             age = self.invented_months * np.exp(UNIT_SPREAD * unit.standard_normal(shape))
             drift = self.drift * unit.standard_normal(shape)
@@ -132,7 +132,7 @@ class MagneticFaults:
             load = own
             for k, number in enumerate(numbers.tolist()):
                 if self.zero_share or self.invented_months:
-                    drawn = np.random.default_rng([seed, place, number + (1 << 40)])
+                    drawn = np.random.default_rng([seed, index, number + (1 << 40)])
                     values[k] += AGEING_OF_NOISE * age * drawn.standard_normal(shape)
                     if drawn.random() < self.zero_share:
                         values[k, drawn.integers(sensor.n_taxels)] = 0

@@ -251,7 +251,7 @@ def _read(row: object) -> tuple[str, dict[str, tuple[float, ...]]]:
 
 
 def _height(shape: str) -> int:
-    """Return the place of the half height in the sizes of a shape."""
+    """Return the index of the half height in the sizes of a shape."""
     return {"sphere": 0, "capsule": 1, "cylinder": 1, "hexagon": 1}.get(shape, 2)
 
 
@@ -313,10 +313,10 @@ def distance_to(item: GraspObject, points: npt.ArrayLike) -> Array:
         >>> round(float(distance_to(object_named("ball"), [0.0, 0.0, 0.043])), 3)
         0.01
     """
-    places = np.asarray(points, dtype=np.float64)
-    flat = np.ascontiguousarray(places.reshape(-1, 3))
+    positions = np.asarray(points, dtype=np.float64)
+    flat = np.ascontiguousarray(positions.reshape(-1, 3))
     signed = _distances(solid(item), flat)
-    return signed.reshape(places.shape[:-1])
+    return signed.reshape(positions.shape[:-1])
 
 
 def _distances(packed: Array, points: Array) -> Array:

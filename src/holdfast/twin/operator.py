@@ -15,7 +15,7 @@ from holdfast.twin.profile import Profile
 from holdfast.twin.steps import MOVE, N_GUIDE
 
 ARM_SPREAD = 0.006
-"""Standard deviation of the place where the finger pushes, about the centre of mass [m]."""
+"""Standard deviation of the position where the finger pushes, about the centre of mass [m]."""
 TREMOR_BAND = (6.0, 11.0)
 """Frequencies of physiological tremor [Hz]."""
 N_TREMORS = 8

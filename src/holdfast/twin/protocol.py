@@ -33,7 +33,7 @@ HAND_OVER_TIME = 0.25
 OPENING_SPEED = 0.05
 """Speed of the fingertips when they release [m/s]."""
 LOST_DISTANCE = 0.04
-"""Distance from its place at the lock beyond which the object is lost [m]."""
+"""Distance from its position at the lock beyond which the object is lost [m]."""
 LOST_CONTACT_TIME = 0.1
 """Time of contact with fewer than two fingertips after which the object is lost [s]."""
 MIN_TOUCH_LOAD = 0.05
@@ -118,7 +118,7 @@ class Protocol:
         self._all_stopped_at = np.inf
         self._released_at = np.inf  # from the end of the hold, a time-out, or `release`
         self._untouched_for = 0.0  # with fewer than two fingertips, while it is held
-        self._locked_place = np.zeros(3)
+        self._locked_position = np.zeros(3)
 
     @property
     def failed(self) -> bool:
@@ -171,18 +171,18 @@ class Protocol:
         gripped = ((loads > MIN_TOUCH_LOAD) | (self.plan.grips <= 0)).all()
         if gripped and time - self._all_stopped_at >= SETTLE_TIME:
             self.locked_at = time
-            self._locked_place = body[:3].copy()
+            self._locked_position = body[:3].copy()
         elif time - self.plan.before > CLOSING_TIMEOUT:
             self._released_at = time + HAND_OVER_TIME
         return self._new_command(1.0, Phase.CLOSING)
 
     def _hold(self, time: float, loads: Array, slip: float, body: Array) -> Command:
         held_for = time - float(self.locked_at or 0.0)
-        # The object is lost if it is far from its place, or if it was touched too little for a
+        # The object is lost if it is far from its position, or if it was touched too little for a
         # while: with one finger it would fall.
         n_touching = sum(load > MIN_TOUCH_LOAD for load in loads.tolist())
         self._untouched_for = self._untouched_for + self._period if n_touching < 2 else 0.0
-        away = body[:3] - self._locked_place
+        away = body[:3] - self._locked_position
         is_far = math.sqrt(away.dot(away)) > LOST_DISTANCE
         if self.lost_at is None and (is_far or self._untouched_for >= LOST_CONTACT_TIME):
             self.lost_at = time

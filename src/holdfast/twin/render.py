@@ -205,8 +205,8 @@ def film(grasp: Grasp, path: Path) -> None:
         if not renderers:
             renderers.append(Renderer(world.hand.model))
         if n_samples % SAMPLES_PER_PICTURE == 0:
-            places = world.bodies[:-1, :3]
-            arrows = np.column_stack([places, world.contact.contact_force])
+            positions = world.bodies[:-1, :3]
+            arrows = np.column_stack([positions, world.contact.contact_force])
             frames.append(renderers[0].picture(world.hand.data, arrows))
 
     try:

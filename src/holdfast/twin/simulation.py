@@ -289,8 +289,8 @@ class Simulation:
         rule = LabelRule(margin=self._profile.label_margin, glitch=glitch)
         modules = {}
         read = {
-            finger: uskin.counts(taxel_forces[:, place], times, grasp.generator(f"skin {finger}"))
-            for place, (finger, uskin) in enumerate(self.uskins.items())
+            finger: uskin.counts(taxel_forces[:, index], times, grasp.generator(f"skin {finger}"))
+            for index, (finger, uskin) in enumerate(self.uskins.items())
         }
         read = self._with_faults(read, times)
         for finger, uskin in self.uskins.items():
@@ -324,8 +324,8 @@ class Simulation:
             push[truth.hand["impact"] != ""] = math.inf
         phase = phases_from_touch(truth.hand["phase"], push, MIN_TOUCH_LOAD)
         fingers = {}
-        for place, finger in enumerate(FINGERS):
-            body = bodies[:, place]
+        for index, finger in enumerate(FINGERS):
+            body = bodies[:, index]
             turns = Rotation.from_matrix(body[:, 3:12].reshape(-1, 3, 3)).as_quat()  # x y z w
             pose = np.column_stack([body[:, :3], turns[:, 3], turns[:, :3]])
             fingers[finger] = {**truth.fingers[finger], "tip_pose": pose}

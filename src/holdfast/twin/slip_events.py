@@ -161,7 +161,7 @@ def draw_course(
     while True:
         drawn: Disturbance | SlipEvent
         if generator.random() < ranges.share:
-            kinds = kinds or [list(SlipKind)[place] for place in generator.permutation(N_KINDS)]
+            kinds = kinds or [list(SlipKind)[index] for index in generator.permutation(N_KINDS)]
             drawn = draw_slip_event(generator, ranges, kinds.pop(), start, scale)
             end = drawn.end
         else:

@@ -122,7 +122,7 @@ def film_stickers(recording: Recording, path: Path, camera: Webcam = Webcam()) -
     size = (camera.height, camera.width)
     wall = cv2.GaussianBlur(generator.normal(0, 1, size).astype("f4"), (0, 0), 9)
     wall = 125 + 12 * wall / wall.std()
-    # Noise is drawn once, with room to cut it at another place for each picture.
+    # Noise is drawn once, with room to cut it elsewhere for each picture.
     noise = generator.normal(0, camera.noise, (camera.height + 64, camera.width + 64)).astype("f4")
     film = cv2.VideoWriter(
         str(path), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"mp4v"), camera.fps, size[::-1]
@@ -204,9 +204,9 @@ def _matrices(pose: Array) -> Array:
 
 def _at(time: float, times: Array, track: Array) -> Array:
     """Return (k, 2) of (n, k, 2) at a time; at the ends that of the first or last sample."""
-    place = np.interp(time, times, np.arange(len(times)))
-    before = min(int(place), len(times) - 2)
-    return np.asarray(track[before] + (place - before) * (track[before + 1] - track[before]))
+    index = np.interp(time, times, np.arange(len(times)))
+    before = min(int(index), len(times) - 2)
+    return np.asarray(track[before] + (index - before) * (track[before + 1] - track[before]))
 
 
 def _texture(number: int) -> npt.NDArray[np.float32]:

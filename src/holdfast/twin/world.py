@@ -148,11 +148,11 @@ class World(ContactWorld):
         self._disturbance = -1
         self._tick = 0
         # The hand is open, and the object where a person puts it.
-        place, turn = object_pose(self.item)
+        position, turn = object_pose(self.item)
         model, data = hand.model, hand.data
         mujoco.mj_resetData(model, data)
         data.qpos[:N_JOINTS] = path.targets(np.full(len(FINGERS), OPEN_GAP))
-        data.qpos[N_JOINTS : N_JOINTS + 3] = place + start[:3]
+        data.qpos[N_JOINTS : N_JOINTS + 3] = position + start[:3]
         half = 0.5 * (turn + start[3])
         data.qpos[N_JOINTS + 3 :] = (np.cos(half), 0.0, 0.0, np.sin(half))
         mujoco.mj_forward(model, data)
@@ -239,11 +239,11 @@ class TruthLog:
         tips = np.array(self._tips)
         fingers = {
             finger: {
-                "contact_force": -tips[:, place, :3],
-                "slip_speed": tips[:, place, TIP_SLIP],
-                "slipping_share": tips[:, place, TIP_SLIPPING_SHARE],
+                "contact_force": -tips[:, index, :3],
+                "slip_speed": tips[:, index, TIP_SLIP],
+                "slipping_share": tips[:, index, TIP_SLIPPING_SHARE],
             }
-            for place, finger in enumerate(self._fingers)
+            for index, finger in enumerate(self._fingers)
         }
         hand = {name: np.array(rows) for name, rows in self._rows.items()}
         return Truth(times, {"phase": np.array(self._phase, dtype=str), **hand}, fingers)

@@ -25,7 +25,7 @@ request is closed [s]."""
 BACKLOG = 32
 """Connections that the system accepts before the server does."""
 LOG_INTERVAL = 10.0
-"""Minimum time between two log lines of the same place in the code [s]."""
+"""Minimum time between two log lines of the same location in the code [s]."""
 
 LOGGER = logging.getLogger("holdfast.web")
 
@@ -124,7 +124,7 @@ class ConnectionLimit:
 class BriefLog(logging.Filter):
     """Filter that shortens log records to one line, and limits how many there are.
 
-    Each place in the code logs at most once in `LOG_INTERVAL`. With HOLDFAST_DEBUG in the
+    Each location in the code logs at most once in `LOG_INTERVAL`. With HOLDFAST_DEBUG in the
     environment, records are kept as they are.
     """
 
@@ -136,10 +136,10 @@ class BriefLog(logging.Filter):
         """Return whether a record is logged; shorten it to one line."""
         if os.environ.get("HOLDFAST_DEBUG"):
             return True
-        place, now = (record.pathname, record.lineno), time.monotonic()
-        if now - self._logged_at.get(place, -LOG_INTERVAL) < LOG_INTERVAL:
+        location, now = (record.pathname, record.lineno), time.monotonic()
+        if now - self._logged_at.get(location, -LOG_INTERVAL) < LOG_INTERVAL:
             return False
-        self._logged_at[place] = now
+        self._logged_at[location] = now
         cause = record.exc_info[1] if record.exc_info else None
         text = record.getMessage() + (f": {cause!r}" if cause else "")
         record.msg, record.args = " ".join(text.split())[:300], ()

@@ -8,7 +8,7 @@ import pytest
 
 from holdfast import save_recording
 from holdfast.cli import main
-from holdfast.devices.sources.xela import places
+from holdfast.devices.sources.xela import addresses
 from holdfast.devices.uri import source_states
 from holdfast.errors import EXTRA_PURPOSES, install_command
 from holdfast.recordings import Recording, Tactile
@@ -29,7 +29,7 @@ def report(capsys):
 
 
 def test_the_report(capsys, monkeypatch):
-    monkeypatch.setattr("holdfast.devices.sources.xela.places.own_address", lambda: None)
+    monkeypatch.setattr("holdfast.devices.sources.xela.addresses.own_address", lambda: None)
     found = report(capsys)
     assert found["holdfast"] == metadata.version("holdfast")
     assert found["packages"]["numpy"] == np.__version__
@@ -81,7 +81,7 @@ def test_where_the_data_are(capsys, monkeypatch, tmp_path):
 
 def test_a_listening_server_is_reported(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
-        monkeypatch.setattr(places, "PORT", server.getsockname()[1])
+        monkeypatch.setattr(addresses, "PORT", server.getsockname()[1])
         assert source_states()["xela"].startswith("a server listens at 127.0.0.1:")
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from holdfast.io import load_labels, save_recording
 from holdfast.labelling.rules import video
-from labelling.rules.test_video import SLIPS, places, recording
+from labelling.rules.test_video import SLIPS, recording, sticker_track
 
 from .helpers import refusal, run, run_json
 
@@ -19,7 +19,7 @@ def pulls(tmp_path, monkeypatch):
 
     def read(path, fps):
         asked.append((path, fps))
-        times, found = places()
+        times, found = sticker_track()
         return times, np.zeros(len(times)), found
 
     monkeypatch.setattr(video, "read_stickers", read)

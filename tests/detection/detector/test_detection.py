@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from holdfast.contact import SLIP_CODE, ContactState, Reason
+from holdfast.demo_data import BOX_SLIPS
 from holdfast.detection import ANY_FINGER, Debounce, Detector, Model, detect, fingertip_force
 from holdfast.errors import ModelError, StreamError
 from holdfast.io import load_recording
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import SlipDecisions
-from holdfast.recorded import BOX_SLIPS
 from holdfast.recordings import Recording
 from holdfast.resampling import resample
 from holdfast.synthetic import synthetic_recording

@@ -76,11 +76,11 @@ def test_a_module_that_stops_and_one_that_never_comes():
 def test_markers_come_after_the_samples_of_their_time():
     markers = ((0.05, "closed"), (0.055, "two\nlines"), (0.05, "and held"))
     got = list(timed_samples([hand(20, markers=markers)]))
-    place = [k for k, item in enumerate(got) if item.notice]
-    texts = [(got[k].time, got[k].notice.removeprefix("marker: ")) for k in place]
+    indices = [k for k, item in enumerate(got) if item.notice]
+    texts = [(got[k].time, got[k].notice.removeprefix("marker: ")) for k in indices]
     assert texts == [(0.05, "closed"), (0.05, "and held"), (0.055, "two lines")]
-    assert got[place[0] - 1].time == 0.05
-    assert all(not got[k].samples for k in place)
+    assert got[indices[0] - 1].time == 0.05
+    assert all(not got[k].samples for k in indices)
     assert [item.time for item in got] == sorted(item.time for item in got)
 
 

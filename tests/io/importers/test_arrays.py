@@ -9,7 +9,7 @@ import pytest
 
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
-from holdfast.io.importers.array_tables import StoredArray, recordings_of_arrays
+from holdfast.io.importers.array_conversion import StoredArray, recordings_of_arrays
 from holdfast.io.importers.arrays import arrays_of_hdf5
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.sensors import sensor

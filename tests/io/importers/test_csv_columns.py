@@ -64,8 +64,8 @@ def test_a_guess_is_read_back_from_its_text():
 def test_consecutive_columns():
     names = ["t", *(f"ch{k}" for k in range(6))]
     layout = Columns(taxels="ch0..ch5").layout(names)
-    places = [(taxel, axis) for taxel in (1, 2) for axis in "xyz"]
-    assert layout == {"": dict(zip(places, names[1:], strict=True))}
+    cells = [(taxel, axis) for taxel in (1, 2) for axis in "xyz"]
+    assert layout == {"": dict(zip(cells, names[1:], strict=True))}
 
 
 def test_a_rate_in_place_of_times():

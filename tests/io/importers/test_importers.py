@@ -45,9 +45,9 @@ def test_an_empty_file(tmp_path, name):
 def test_a_pointer_of_git_lfs_is_named(tmp_path):
     path = tmp_path / "a.h5"
     path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:a2aef56b\n")
-    for place, form in ((path, "arrays"), (path, None), (tmp_path, None)):
+    for source, form in ((path, "arrays"), (path, None), (tmp_path, None)):
         with pytest.raises(RecordingError, match=rf"{path} .*git lfs pull"):
-            list(import_recordings(place, form))
+            list(import_recordings(source, form))
 
 
 def test_a_pipe_is_refused_at_once(tmp_path):

@@ -6,19 +6,19 @@ from holdfast.io import import_recordings
 from holdfast.sensors import hand
 
 
-def write(path, readings, place=0, time="time", times=None):
+def write(path, readings, index=0, time="time", times=None):
     n = len(readings)
     names = [f"F{axis}{taxel}" for taxel in range(readings.shape[1] // 3) for axis in "xyz"]
-    names.insert(place, time)
+    names.insert(index, time)
     times = np.arange(n) / 100 if times is None else times
-    table = np.insert(readings.astype(float), place, times, axis=1)
+    table = np.insert(readings.astype(float), index, times, axis=1)
     np.savetxt(path, table, "%.9g", ",", header=",".join(names), comments="")
 
 
-@pytest.mark.parametrize("place", [0, 1104, 5])
-def test_all_modules_of_the_hand_come_out(tmp_path, place):
+@pytest.mark.parametrize("index", [0, 1104, 5])
+def test_all_modules_of_the_hand_come_out(tmp_path, index):
     readings = np.arange(3 * 1104).reshape(3, 1104)
-    write(tmp_path / "grasp.csv", readings, place, "Time [s]")
+    write(tmp_path / "grasp.csv", readings, index, "Time [s]")
     (recording,) = import_recordings(tmp_path / "grasp.csv")
     allegro = hand("allegro-uskin")
     assert recording.name == "grasp"

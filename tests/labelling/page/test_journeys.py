@@ -50,8 +50,8 @@ def test_draw_and_zoom_with_the_fingers_on_a_phone(visit, service):
     touch = page.context.new_cdp_session(page)
 
     def send(kind, *points):
-        places = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
-        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+        touches = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
+        touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
     page.locator("#cursor-canvas").scroll_into_view_if_needed()
     page.touchscreen.tap(*position(page, "thumb", 10))

@@ -70,16 +70,16 @@ def poses(times, way, turn=None, jitter=0.0, seed=0):
         np.outer(np.zeros_like(times) if turn is None else turn, [0, 0, 1])
         + rng.normal(0, jitter * 10, (len(times), 3))
     )
-    place = np.stack([way, np.zeros_like(way), 0.05 + np.zeros_like(way)], axis=1)
-    place = place + rng.normal(0, jitter, place.shape)
-    return np.concatenate([place, np.roll(turns.as_quat(), 1, axis=1)], axis=1)
+    position = np.stack([way, np.zeros_like(way), 0.05 + np.zeros_like(way)], axis=1)
+    position = position + rng.normal(0, jitter, position.shape)
+    return np.concatenate([position, np.roll(turns.as_quat(), 1, axis=1)], axis=1)
 
 
 def moved(pose, rotation, translation):
     """The same poses in another world frame."""
     turned = rotation * Rotation.from_quat(np.roll(pose[:, 3:], -1, axis=1))
-    place = rotation.apply(pose[:, :3]) + translation
-    return np.concatenate([place, np.roll(turned.as_quat(), 1, axis=1)], axis=1)
+    position = rotation.apply(pose[:, :3]) + translation
+    return np.concatenate([position, np.roll(turned.as_quat(), 1, axis=1)], axis=1)
 
 
 def tracked(object_pose, tip_pose=None, start=0.0, **more):

@@ -70,10 +70,10 @@ def test_the_centre_of_pressure_is_where_it_is_pressed():
     readings[:, 5, 2] = load * (times < 6)
     readings[:, 10, 2] = load * (times >= 6)
     recording = Recording("one", {"thumb": Tactile(PATCH, times, readings)})
-    place = centre_of_pressure(recording.modules["thumb"], 0.5, hand_force(recording))
-    assert place[400] == pytest.approx(PATCH.positions[5])
-    assert place[800] == pytest.approx(PATCH.positions[10])
-    assert np.isfinite(place).all()
+    centre = centre_of_pressure(recording.modules["thumb"], 0.5, hand_force(recording))
+    assert centre[400] == pytest.approx(PATCH.positions[5])
+    assert centre[800] == pytest.approx(PATCH.positions[10])
+    assert np.isfinite(centre).all()
 
 
 def test_an_empty_module_is_left_out():

@@ -19,8 +19,8 @@ GRID = np.arange(0, 3, 0.01)
 INSIDE = slice(20, -20)
 
 
-def track(places, turns, times=GRID):
-    return PoseTrack(times, places, np.roll(turns.as_quat(), 1, axis=1))
+def track(positions, turns, times=GRID):
+    return PoseTrack(times, positions, np.roll(turns.as_quat(), 1, axis=1))
 
 
 def turning(rate, axis, times=GRID):
@@ -62,12 +62,12 @@ def test_rolling_has_no_speed_at_the_contact():
 @settings(max_examples=20)
 def test_relative_motion_does_not_depend_on_the_world_frame(seed):
     rng = np.random.default_rng(seed)
-    places, carried = rng.normal(size=(2, 300, 3)).cumsum(axis=1) * 1e-3
-    turns, tip_turns = (Rotation.from_rotvec(v * 3) for v in (carried, places))
+    positions, carried = rng.normal(size=(2, 300, 3)).cumsum(axis=1) * 1e-3
+    turns, tip_turns = (Rotation.from_rotvec(v * 3) for v in (carried, positions))
     world, shift = Rotation.random(rng=seed), rng.normal(size=3)
-    here = relative_track(track(places, turns), track(carried, tip_turns))
+    here = relative_track(track(positions, turns), track(carried, tip_turns))
     there = relative_track(
-        track(world.apply(places) + shift, world * turns),
+        track(world.apply(positions) + shift, world * turns),
         track(world.apply(carried) + shift, world * tip_turns),
     )
     assert here.positions == pytest.approx(there.positions, abs=1e-12)
@@ -92,26 +92,26 @@ def test_quaternions_of_either_sign_are_one_rotation():
 
 
 def test_motion_is_unknown_where_poses_are_missing():
-    places = nowhere()
-    places[100:105] = places[200:250] = np.nan
-    motion = motion_of(track_with_nan(places), GRID)
+    positions = nowhere()
+    positions[100:105] = positions[200:250] = np.nan
+    motion = motion_of(track_with_nan(positions), GRID)
     assert motion.known[95:110].all()
     assert not motion.known[201:249].any()
     assert np.isnan(motion.speed[201:249]).all()
     assert pytest.approx(0.1) == MAX_POSE_GAP
 
 
-def track_with_nan(places):
-    quaternions = np.tile([1.0, 0, 0, 0], (len(places), 1))
-    return PoseTrack(GRID, places, quaternions)
+def track_with_nan(positions):
+    quaternions = np.tile([1.0, 0, 0, 0], (len(positions), 1))
+    return PoseTrack(GRID, positions, quaternions)
 
 
 @given(jitter=st.floats(1e-5, 1e-2))
 @settings(max_examples=10)
 def test_the_noise_of_the_speed_is_what_a_body_at_rest_shows(jitter):
     times = np.arange(0, 30, 0.01)
-    places = np.random.default_rng(0).normal(0, jitter, (len(times), 3))
-    still = track(places, turning(0, [0, 0, 1], times), times)
+    positions = np.random.default_rng(0).normal(0, jitter, (len(times), 3))
+    still = track(positions, turning(0, [0, 0, 1], times), times)
     motion = motion_of(still, times)
     shown = np.sqrt((motion.speed[INSIDE] ** 2).mean())
     assert motion.speed_noise == pytest.approx(shown, rel=0.1)

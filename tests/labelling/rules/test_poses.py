@@ -101,19 +101,19 @@ def test_truth_with_something_else(hand, text):
 
 
 @pytest.mark.parametrize(
-    ("times", "places", "text"),
+    ("times", "shape", "text"),
     [([0.0, 0.0], (2, 3), "times"), ([0.0, 1.0], (2, 2), "shapes")],
 )
-def test_arrays_of_a_track_must_fit(times, places, text):
+def test_arrays_of_a_track_must_fit(times, shape, text):
     with pytest.raises(RecordingError, match=text):
-        PoseTrack(np.array(times), np.zeros(places), np.zeros((2, 4)))
+        PoseTrack(np.array(times), np.zeros(shape), np.zeros((2, 4)))
 
 
 def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
     times = np.arange(60) / 100
-    place = np.repeat(np.arange(12), 5)[:, None] * [1.0, 0, 0]  # at 20 Hz, repeated at 100 Hz
-    place[20:40] = place[20]
-    place[50:] = 10.0
+    position = np.repeat(np.arange(12), 5)[:, None] * [1.0, 0, 0]  # at 20 Hz, repeated at 100 Hz
+    position[20:40] = position[20]
+    position[50:] = 10.0
     turns = np.tile([1.0, 0, 0, 0], (60, 1))
-    seen = in_sight(PoseTrack(times, place, turns)).seen
+    seen = in_sight(PoseTrack(times, position, turns)).seen
     assert seen.tolist() == [True] * 20 + [False] * 20 + [True] * 10 + [False] * 10

@@ -59,8 +59,8 @@ def test_a_slip_is_an_interval_of_its_own_within_the_disturbance():
     ((start, end),) = slips_of(labels)
     assert start == pytest.approx(PUSH, abs=0.02)
     assert end == pytest.approx(PUSHED, abs=0.02)
-    place = next(k for k, label in enumerate(labels) if label.cause is Cause.SLIP)
-    before, slip, after = labels[place - 1 : place + 2]
+    index = next(k for k, label in enumerate(labels) if label.cause is Cause.SLIP)
+    before, slip, after = labels[index - 1 : index + 2]
     assert (before.end, after.start) == (slip.start, slip.end)
     assert {label.state.value for label in (before, slip, after)} == {"UNSTABLE"}
     assert {label.author for label in labels} == {"rule:tracking"}

@@ -1,4 +1,4 @@
-"""Slips in a video, from places of stickers that a test makes: what moves, and what is felt."""
+"""Slips in a video, from poses of stickers that a test makes: what moves, and what is felt."""
 
 from dataclasses import replace
 
@@ -46,8 +46,8 @@ def recording(seed=0):
     return Recording("pulls", modules, {})
 
 
-def places(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
-    """Return times [s] and places of the stickers of the object and of a fingertip."""
+def sticker_track(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
+    """Return times [s] and poses of the stickers of the object and of a fingertip."""
     times = np.arange(0, SECONDS - 1, 1 / fps)
     shown = times + SHIFT
     slid = sum(size * np.clip((shown - onset) / 0.2, 0, 1) for onset, size in slips)
@@ -58,10 +58,10 @@ def places(slips=SLIPS, tip_size=15.0, elastic=0.3, tip=2, fps=FPS):
         (0, 24.0, np.zeros((1, 2))),
         (tip, tip_size, moved + np.array([30.0, 5.0])),
     ):
-        place = np.zeros((len(times), 2, 3))
-        place[:, 0, 0] = place[:, 1, 1] = side * PIXELS
-        place[:, :, 2] = middle * PIXELS
-        found[number] = place + generator.normal(0, 0.01, place.shape)
+        pose = np.zeros((len(times), 2, 3))
+        pose[:, 0, 0] = pose[:, 1, 1] = side * PIXELS
+        pose[:, :, 2] = middle * PIXELS
+        found[number] = pose + generator.normal(0, 0.01, pose.shape)
     return times, found
 
 
@@ -91,7 +91,7 @@ def check_onsets(labels, within, finger="index"):
 
 
 def test_slips_are_found_and_yielding_is_none(film):
-    film(*places())
+    film(*sticker_track())
     labels = propose("tracking", recording(), video="run.mp4")
     assert list(labels) == ["index"]  # no sticker of the thumb is in view
     found = check_onsets(labels, 0.02)
@@ -110,20 +110,20 @@ def test_slips_are_found_and_yielding_is_none(film):
 
 
 def test_pulls_without_sliding_have_no_slip(film):
-    film(*places(slips=((0.0, 0.0),)))
+    film(*sticker_track(slips=((0.0, 0.0),)))
     assert slips_of(propose("tracking", recording(), video="run.mp4")["index"]) == []
 
 
 def test_irregular_stamps_and_short_gaps_are_no_hindrance(film):
-    times, found = places()
+    times, found = sticker_track()
     kept = np.random.default_rng(3).random(len(times)) > 0.1  # a tenth of the pictures is lost
     found[2][1200:1203] = np.nan
-    film(times[kept], {number: place[kept] for number, place in found.items()})
+    film(times[kept], {number: pose[kept] for number, pose in found.items()})
     check_onsets(propose("tracking", recording(), video="run.mp4"), 0.03)
 
 
 def test_an_offset_and_numbers_of_stickers_can_be_given(film):
-    times, found = places(tip=7)
+    times, found = sticker_track(tip=7)
     film(times, found)
     labels = propose(
         "tracking", recording(), video="run.mp4", offset=SHIFT, bodies={"object": 0, "thumb": 7}
@@ -133,7 +133,7 @@ def test_an_offset_and_numbers_of_stickers_can_be_given(film):
 
 
 def changed(change, **words):
-    times, found = places(**words)
+    times, found = sticker_track(**words)
     return change(times, found) or (times, found)
 
 
@@ -152,18 +152,18 @@ def show_another_time(times, found):
 def lose_pictures(times, found):
     """Pictures that were dropped without a gap in the stamps."""
     kept = np.arange(len(times)) % 50 < 49
-    return times[: kept.sum()], {number: place[kept] for number, place in found.items()}
+    return times[: kept.sum()], {number: pose[kept] for number, pose in found.items()}
 
 
 NOT_ALIKE = "its (motion is not that of|clock is known to)"
 BAD_FILMS = {
-    "no sticker": (lambda: (places()[0], {}), "none"),
+    "no sticker": (lambda: (sticker_track()[0], {}), "none"),
     "no object": (lambda: without(0), r"index \(2\) in 100%"),
     "no finger": (lambda: without(2), r"object \(0\) in 100%"),
     "hidden": (lambda: changed(hide), r"object \(0\) in 21%, index \(2\) in 100%"),
-    "other size": (lambda: places(tip_size=30.0), r"sticker 2 \(index\) .*15 mm .*24 mm"),
+    "other size": (lambda: sticker_track(tip_size=30.0), r"sticker 2 \(index\) .*15 mm .*24 mm"),
     "other time": (lambda: changed(show_another_time), "its motion is not that of"),
-    "nothing moves": (lambda: places(slips=((0, 0),), elastic=0), NOT_ALIKE),
+    "nothing moves": (lambda: sticker_track(slips=((0, 0),), elastic=0), NOT_ALIKE),
     "lost pictures": (lambda: changed(lose_pictures), NOT_ALIKE),
 }
 
@@ -177,7 +177,7 @@ def test_a_film_that_shows_no_slips_is_refused(film, made, message):
 
 @pytest.mark.parametrize("bodies", [{"object": 0}, {"index": 2}, {"object": 0, "toe": 3}])
 def test_stickers_of_other_bodies_are_refused(film, bodies):
-    film(*places())
+    film(*sticker_track())
     with pytest.raises(ValueError, match="thumb, index"):
         propose("tracking", recording(), video="run.mp4", bodies=bodies)
 
@@ -228,10 +228,10 @@ def test_slips_cut_held_labels_only():
 
 def stamped(tmp_path, film, lines):
     """A film of which a tenth of the pictures was lost, with no gap in the stamps of its file."""
-    times, found = places()
+    times, found = sticker_track()
     kept = np.random.default_rng(3).random(len(times)) > 0.1
     n = kept.sum()
-    film(np.arange(n) / 1.0, {number: place[kept] for number, place in found.items()})
+    film(np.arange(n) / 1.0, {number: pose[kept] for number, pose in found.items()})
     # On the clock of the samples, as `record --camera` writes them.
     text = "".join(f"{time:.6f}\n" for time in times[kept] + SHIFT)
     (tmp_path / "run.times").write_text(text + lines)
@@ -262,7 +262,7 @@ def test_stamps_that_are_none(film, tmp_path, monkeypatch, lines):
 
 def measured(names, scale=1e-3):
     """Return lines of a CSV file of another instrument, which sees the same motion."""
-    times, found = places()
+    times, found = sticker_track()
     moved = (found[2][:, :, 2] - found[0][:, :, 2]) / PIXELS
     away = scale * (moved - moved[0])
     turned = moved[:, 0] - moved[0, 0]
@@ -283,7 +283,7 @@ def measured(names, scale=1e-3):
         (("time", "qw", "qx", "qy", "qz"), None),
         (("time", "x", "y", "z", "qw", "qx", "qy", "qz"), "x"),
     ],
-    ids=["places", "a stage", "a motion sensor", "one of many"],
+    ids=["poses", "a stage", "a motion sensor", "one of many"],
 )
 def test_other_instruments_give_the_same_onsets(tmp_path, names, column):
     path = tmp_path / "stage.csv"
@@ -322,7 +322,7 @@ def test_something_must_be_measured():
 
 
 def test_a_flash_gives_the_offset_of_clocks(film, monkeypatch):
-    times, found = places()
+    times, found = sticker_track()
     generator = np.random.default_rng(4)
     levels = 90 + generator.normal(0, 0.2, len(times))
     # A lamp is switched on at 7 s; the page lights up twice, one picture before its marker.
@@ -390,7 +390,7 @@ class TestDoubt:
         assert not video.may_slide(rest, np.zeros_like(held), rule, 3).any()
 
     def test_what_no_picture_shows_is_doubtful(self, film, monkeypatch):
-        times, found = places()
+        times, found = sticker_track()
         film(times, found)
         seen = video.tip_motions
 

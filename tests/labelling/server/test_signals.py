@@ -67,8 +67,8 @@ def test_pairs_hold_every_sample_between_them():
     values = np.array(exact["F_x"])
     for k in range(len(begins)):
         own = values[bins == k]
-        places = sorted([own.argmin(), own.argmax()])
-        assert [first[k], second[k]] == own[places].tolist()
+        indices = sorted([own.argmin(), own.argmax()])
+        assert [first[k], second[k]] == own[indices].tolist()
 
 
 @pytest.mark.parametrize("points", [3, 50, 100, 400])

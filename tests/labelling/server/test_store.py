@@ -46,8 +46,8 @@ def bare(tmp_path):
     return load_recording(path), path
 
 
-def save(place, labels, revision="none", **words):
-    recording, path = place
+def save(opened, labels, revision="none", **words):
+    recording, path = opened
     given = {"author": "ada", "time": NOW, "note": "nice", **words}
     return save_stored(path, recording, labels, revision=revision, **given)
 

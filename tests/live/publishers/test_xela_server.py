@@ -127,12 +127,12 @@ class InTurn(Made):
         if self.ended:
             return None
         names = list(self.sensors)
-        k, place = divmod(self.k, len(names))
+        k, index = divmod(self.k, len(names))
         time.sleep(PERIOD / len(names))
         self.k += 1
-        name = names[place]
+        name = names[index]
         samples = {name: samples_of(self.sensors, k)[name]}
-        return Arrival(time_of(k) + place * PERIOD / len(names), samples, time.monotonic())
+        return Arrival(time_of(k) + index * PERIOD / len(names), samples, time.monotonic())
 
 
 @pytest.mark.parametrize(
@@ -153,12 +153,12 @@ def test_modules_with_separate_times(version, sensors, whole_hand):
             for name in seen.keys() & arrival.samples.keys():
                 seen[name].append((arrival.time, arrival.samples[name]))
     shift = seen["thumb"][0][0] - time_of(0)
-    for place, (name, got) in enumerate(seen.items()):
+    for index, (name, got) in enumerate(seen.items()):
         assert len(got) == n
         for k, (when, readings) in enumerate(got):
             np.testing.assert_array_equal(readings, samples_of(sensors, k)[name])
             if server.encoder.has_own_stamps:
-                expected = time_of(k) + place * PERIOD / len(sensors)
+                expected = time_of(k) + index * PERIOD / len(sensors)
                 assert when - shift == pytest.approx(expected, abs=2e-6)
 
 

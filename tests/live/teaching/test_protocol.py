@@ -228,7 +228,7 @@ def test_a_protocol_goes_on_at_its_step():
         GraspResult("pull", 2, 0.0, False),  # skipped
     ]
     protocol = GuidedProtocol(SENSORS, done, (HOLD, PULL))
-    assert (protocol.step.name, protocol.number, protocol.n_places) == ("pull", 1, 3)
+    assert (protocol.step.name, protocol.number, protocol.n_grasps) == ("pull", 1, 3)
     all_done = [*done, GraspResult("pull", 1, 9.0, True, "003-pull")]
     assert GuidedProtocol(SENSORS, all_done, (HOLD, PULL)).stage is Stage.OVER
 

@@ -62,7 +62,7 @@ PUBLISHED_ZHANG: PublishedValues = {"accuracy": 62.7, "FDR": 49.1}
 
 
 STATEMENTS = Path(__file__).with_name("discrepancies.csv")
-"""Statements of the paper: subject, place in the paper, contents in short, value if there is one.
+"""Statements of the paper: subject, position in it, contents in short, value if there is one.
 Those on the same subject contradict each other."""
 
 

@@ -170,7 +170,7 @@ def evaluate_variants(
 def confusion_counts(classifier: Classifier, samples: Samples, n_recordings: int) -> Integers:
     """Return the numbers (n_recordings, 4) of TN, FP, FN and TP of each recording."""
     called_stable = classifier.probability(samples.features) >= classifier.threshold
-    # One number for each pair of a recording and a place in [TN, FP, FN, TP].
+    # One number for each pair of a recording and an index in [TN, FP, FN, TP].
     cell = 4 * samples.groups + 2 * samples.positive + called_stable
     return np.bincount(cell, minlength=4 * n_recordings).reshape(-1, 4)
 

@@ -100,9 +100,9 @@ def accuracy(metrics):
 
 def test_false_alarms_add_up(tables):
     for row in rows_of(tables["events"], figure="false alarms under stable label, per minute"):
-        place = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
+        keys = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
         parts = [
-            rows_of(tables["events"], **place, figure=figure)[0]
+            rows_of(tables["events"], **keys, figure=figure)[0]
             for figure in ("of a glitch", "other false alarms")
         ]
         assert row.ours == pytest.approx(sum(part.ours for part in parts))

@@ -62,9 +62,9 @@ def test_untouched_is_what_the_detector_gives(corpus, recordings):
 def test_adapted_to_all_others_is_what_train_gives(corpus, recordings):
     found = model_estimates("adapted to all", corpus, 0)
     setting = Setting.adapting(Model.load(SHIPPED))
-    for place, recording in enumerate(recordings):
-        others = [each for k, each in enumerate(recordings) if k != place]
-        same(found[place], train(others, setting).model, recording)
+    for index, recording in enumerate(recordings):
+        others = [each for k, each in enumerate(recordings) if k != index]
+        same(found[index], train(others, setting).model, recording)
 
 
 def test_adapted_to_one_takes_one_with_both_classes(corpus, recordings, monkeypatch):

@@ -42,9 +42,9 @@ def corpus(tmp_path_factory, recordings):
 def test_every_recording_is_held_out_once(n, split):
     objects = [f"object {k % 3}" for k in range(n)]
     folds = list(held_out_folds(objects, split, 5, seed=1))
-    assert sorted(place for fold in folds for place in fold) == list(range(n))
+    assert sorted(index for fold in folds for index in fold) == list(range(n))
     if split == "object":
-        assert all(len({objects[place] for place in fold}) == 1 for fold in folds)
+        assert all(len({objects[index] for index in fold}) == 1 for fold in folds)
         assert len(folds) == min(3, n)
 
 
@@ -70,8 +70,8 @@ def test_an_evaluated_recording_does_not_influence_its_scores(tmp_path, recordin
         next(score_splits(each))
         for each in (job, msgspec.structs.replace(job, train=inverted_corpus))
     )
-    for place, (case, twin) in enumerate(zip(scored, inverted_scored, strict=True)):
-        assert same(case, twin) == (place in held)
+    for index, (case, twin) in enumerate(zip(scored, inverted_scored, strict=True)):
+        assert same(case, twin) == (index in held)
 
 
 def inverted(recording):

@@ -12,8 +12,8 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def patch(n_taxels=1, rate=100.0, unit="count"):
     """A patch whose taxel frames are the fingertip frame: the force is the sum of its taxels."""
-    places, turns = np.zeros((n_taxels, 3)), np.tile(np.eye(3), (n_taxels, 1, 1))
-    return Sensor("patch", places, turns, UP, rate=rate, unit=unit)
+    positions, turns = np.zeros((n_taxels, 3)), np.tile(np.eye(3), (n_taxels, 1, 1))
+    return Sensor("patch", positions, turns, UP, rate=rate, unit=unit)
 
 
 def pressed(readings, rate=100.0, unit="count", times=None) -> HandSignal:

@@ -35,8 +35,8 @@ def test_a_recording_is_predicted_by_fits_without_it(tmp_path):
             name: [replace(label, state=state) for label in module.labels]
             for name, module in first.modules.items()
         }
-        place = tmp_path / state.value
-        main = scan_corpus("main", save_all(place, [first.with_labels(labels), *rest]))
+        folder = tmp_path / state.value
+        main = scan_corpus("main", save_all(folder, [first.with_labels(labels), *rest]))
         found.append(experiments.predict_examples({"main": main}, "index", 0)[1])
     assert found[0].recording == "2-0"
     assert found[0] == found[1]

@@ -18,12 +18,12 @@ def corpus(tmp_path_factory):
 
 def test_features_and_classes_are_those_of_each_recording(corpus):
     pool = pool_samples(corpus, corpus.rate, "index", 8, seed=0)
-    for place, recording in enumerate(corpus.load()):
+    for index, recording in enumerate(corpus.load()):
         module = recording.modules["index"]
         force = fingertip_force(module.readings, module.sensor, 0.5, module.times)
         features = haar_features(force, 8)
         known = np.isfinite(features[:, 0]) & (module.label_states != UNKNOWN)
-        mine = pool.samples.groups == place
+        mine = pool.samples.groups == index
         assert np.array_equal(pool.samples.features[mine, :6], features[known])
         assert np.array_equal(pool.samples.positive[mine], module.label_states[known] == STABLE)
 
@@ -39,8 +39,8 @@ def test_energy_is_the_sum_of_squared_details_of_the_normal_force(corpus):
 def test_parts_do_not_depend_on_the_window_or_the_finger(corpus):
     one = pool_samples(corpus, corpus.rate, "index", 4, seed=3)
     two = pool_samples(corpus, corpus.rate, "thumb", 14, seed=3)
-    for place in range(3):
-        mine, other = (pool.parts[pool.samples.groups == place] for pool in (one, two))
+    for index in range(3):
+        mine, other = (pool.parts[pool.samples.groups == index] for pool in (one, two))
         assert np.array_equal(mine[10:], other)  # a window of 14 begins ten samples later
 
 

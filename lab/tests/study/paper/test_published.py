@@ -39,8 +39,8 @@ def number(text):
 def test_table_two_has_the_32_values_of_the_paper():
     head, *lines = [line.split() for line in TABLE_II.split("\n") if line]
     expected = {
-        int(window): {line[0]: number(line[1 + place]) for line in lines}
-        for place, window in enumerate(head[1:])
+        int(window): {line[0]: number(line[1 + column]) for line in lines}
+        for column, window in enumerate(head[1:])
     }
     assert expected == PUBLISHED_WINDOW
     assert sum(len(figures) for figures in PUBLISHED_WINDOW.values()) == 32

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.base import ForceTarget, Law, Touch
 from holdfast_grip.laws.costanzo import Costanzo
 from holdfast_grip.laws.fixed import Fixed
 from holdfast_grip.laws.friction_margin import FrictionMargin
@@ -20,7 +20,7 @@ LAWS: dict[str, Callable[[], Law]] = {
 }
 """Laws by name, with the best of the settings that were tried (docs/study/grip.md)."""
 
-__all__ = ["LAWS", "Law", "Touch", "Wish", "law_named"]
+__all__ = ["LAWS", "ForceTarget", "Law", "Touch", "law_named"]
 
 
 def law_named(name: str) -> Law:

@@ -111,15 +111,15 @@ class Touch:
         self.start_normal = self.normal
 
 
-Wish = tuple[float, GripReason]
-"""Force scale that a law wants for a finger, and why it differs from the last one."""
+ForceTarget = tuple[float, GripReason]
+"""Target force scale of a finger, and the reason if it differs from the present one."""
 
 
 class Law(ABC):
-    """Law of grip force: from the touches of the loaded fingers to the force scales it wants.
+    """Law of grip force: from the touches of the loaded fingers to their target scales.
 
-    The controller limits what a law wants: its speed, range and cooldown. A law has no clock,
-    and two objects of a class that get the same touches want the same.
+    The controller limits the speed, range and cooldown of the targets. A law has no clock, and two
+    objects of a class return the same targets for the same touches.
 
     Attributes:
         needs_newtons: whether the law needs forces in newtons.
@@ -142,8 +142,8 @@ class Law(ABC):
         """
 
     @abstractmethod
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
-        """Return what the law wants for each finger.
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
+        """Return the target of each finger.
 
         Args:
             touches: of the loaded fingers, in the order of `start`.
@@ -152,6 +152,6 @@ class Law(ABC):
         """
 
 
-def stay(touches: Sequence[Touch]) -> list[Wish]:
-    """Return wishes that change nothing."""
+def stay(touches: Sequence[Touch]) -> list[ForceTarget]:
+    """Return the present scales as targets."""
     return [(touch.scale, GripReason.NONE) for touch in touches]

@@ -29,7 +29,7 @@ Different:
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish, stay
+from holdfast_grip.laws.base import ForceTarget, Law, Touch, stay
 from holdfast_grip.laws.relaxation import Relaxation
 
 STATIC_MARGIN = 1.1
@@ -78,7 +78,7 @@ class Costanzo(Law):
         self._friction, self._integral = self.first_friction, 0.0
         self.relaxation.start()
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scale of the static and the dynamic force, the same for all fingers."""
         if not (self._start_force > 0 and all(touch.known for touch in touches)):
             return stay(touches)
@@ -102,13 +102,13 @@ class Costanzo(Law):
             self._integral = min(self._integral, LARGEST_DYNAMIC_FORCE)
             proportional = self.gain * PROPORTIONAL_GAIN * slip
             dynamic = min(proportional + self._integral, LARGEST_DYNAMIC_FORCE)
-            wanted = (static + dynamic) / self._start_force
-            reason = GripReason.SLIP if wanted > scale else GripReason.NONE
-            return [(max(wanted, scale), reason)] * len(touches)
+            needed = (static + dynamic) / self._start_force
+            reason = GripReason.SLIP if needed > scale else GripReason.NONE
+            return [(max(needed, scale), reason)] * len(touches)
         least = static / self._start_force
         if least > STATIC_RISE * scale:
             return [(least, GripReason.MARGIN)] * len(touches)
-        wish = self.relaxation.wish(scale, time, dt, least)
+        target = self.relaxation.target(scale, time, dt, least)
         # The integral falls with the force, or the next slip would begin with the old one.
-        self._integral = min(self._integral, max(wish[0] - least, 0.0) * self._start_force)
-        return [wish] * len(touches)
+        self._integral = min(self._integral, max(target[0] - least, 0.0) * self._start_force)
+        return [target] * len(touches)

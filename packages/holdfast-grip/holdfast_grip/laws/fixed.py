@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from holdfast_grip.laws.base import Law, Touch, Wish, stay
+from holdfast_grip.laws.base import ForceTarget, Law, Touch, stay
 
 
 class Fixed(Law):
@@ -11,6 +11,6 @@ class Fixed(Law):
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Do nothing."""
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scales as they are."""
         return stay(touches)

@@ -12,7 +12,7 @@ and fall were tuned by the rule for all rivals (docs/study/grip.md).
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish, stay
+from holdfast_grip.laws.base import ForceTarget, Law, Touch, stay
 
 FORCE_MARGIN = 1.3
 """Factor of the least normal force."""
@@ -58,9 +58,9 @@ class FrictionMargin(Law):
         """Start with the friction that the first grip proves."""
         self._friction = [self.first_friction] * len(touches)
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scale that the tangential force of each finger needs."""
-        wishes = stay(touches)
+        targets = stay(touches)
         for k, touch in enumerate(touches):
             # Without a force nothing is known of the friction: the scale stays.
             if not (touch.known and touch.normal > LOWEST_FORCE and touch.start_normal > 0):
@@ -71,12 +71,12 @@ class FrictionMargin(Law):
             # A finger that slips below the known coefficient shows a lower one.
             elif ratio < self._friction[k]:
                 self._friction[k] = max(self.first_friction, SLIP_SHARE * ratio)
-            target = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
-            scale = target / touch.start_normal
+            force = max(self.margin * touch.tangential / self._friction[k], LOWEST_FORCE)
+            scale = force / touch.start_normal
             if scale <= touch.scale:
                 share = max(1.0 - self.fall * dt, FALL_SHARE)
-                wishes[k] = (max(scale, share * touch.scale), GripReason.RELAX)
+                targets[k] = (max(scale, share * touch.scale), GripReason.RELAX)
             # Two margins: a rise begins below the lower one, and ends at the upper one.
             elif self.acts_at * scale > self.margin * touch.scale:
-                wishes[k] = (scale, GripReason.MARGIN)
-        return wishes
+                targets[k] = (scale, GripReason.MARGIN)
+        return targets

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.base import ForceTarget, Law, Touch
 from holdfast_grip.laws.relaxation import Relaxation
 
 HIGH_PASS = 5.0
@@ -49,13 +49,13 @@ class Pr2(Law):
         self._filters = [_Filters(touch) for touch in touches]
         self.relaxation.start()
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Raise all fingers if one slips; else relax them."""
         pairs = zip(self._filters, touches, strict=True)
         factor = self.threshold_factor
         slips = [touch.known and filters.slips(touch, dt, factor) for filters, touch in pairs]
         if not any(slips):
-            return [self.relaxation.wish(touch.scale, time, dt) for touch in touches]
+            return [self.relaxation.target(touch.scale, time, dt) for touch in touches]
         self.relaxation.slipped(max(touch.scale for touch in touches), time)
         return [(touch.scale * self.gain, GripReason.SLIP) for touch in touches]
 

@@ -1,7 +1,7 @@
 """Relaxation: the force of a law that only reacts falls slowly while nothing slips."""
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Wish
+from holdfast_grip.laws.base import ForceTarget
 
 RELAXATION_SETTLE_TIME = 0.5
 """Time without a slip before the force falls [s]."""
@@ -36,7 +36,7 @@ class Relaxation:
             self._floor = max(1.0, RELAXATION_MARGIN * scale)
         self._slipped_at = time
 
-    def wish(self, scale: float, time: float, dt: float, least: float = 0.0) -> Wish:
+    def target(self, scale: float, time: float, dt: float, least: float = 0.0) -> ForceTarget:
         """Return the scale that follows in calm, at least a scale that the law needs anyway."""
         lowest = max(self._floor, least)
         settled = time - self._slipped_at > RELAXATION_SETTLE_TIME

@@ -45,7 +45,7 @@ import math
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.base import ForceTarget, Law, Touch
 from holdfast_grip.laws.response import ResponseTimer
 
 _NONE, _RELAX = GripReason.NONE, GripReason.RELAX
@@ -204,7 +204,7 @@ class Stability(Law):
         self._start_force = sum(touch.start_normal for touch in touches)
         self._load = sum(finger.load for finger in self._fingers)
         self._press = sum(finger.press for finger in self._fingers)
-        # The calm grip: `wishes` follows it while the hand is calm, and the rules compare with it.
+        # The calm grip: `targets` follows it while the hand is calm, and the rules compare with it.
         self._calm_load, self._calm_press, self._calm_scale = self._load, self._press, 1.0
         self._calm_ratio = self._load / self._press if self._press > 0 else 0.0
         # Doubt above its level, summed over time, and the scale at which a step ends.
@@ -227,7 +227,7 @@ class Stability(Law):
         self._load_rate = self._unstable = self._base = 0.0
         self._scale, self._slides, self._all_known = 1.0, False, True
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Return the scale that doubt, load and friction need, the same for all fingers."""
         doubt = self._observe(touches, dt)
         scale = self._scale
@@ -256,17 +256,17 @@ class Stability(Law):
         # The limit of speed may spread a step over several samples.
         pressing = time - max(self._stepped_at, self._followed_at) < PRESS_TIME
         if pressing and self._target > scale:
-            wish = self._target, self._reason
+            target = self._target, self._reason
         elif self._probes and PROBE_DELAY <= time - self._started_at < PROBE_TIME:
-            wish = max(scale, 1.0 + PROBE_RISE), GripReason.MARGIN
+            target = max(scale, 1.0 + PROBE_RISE), GripReason.MARGIN
         elif self._knows_slips and not self._probes and scale < self._lowest():
-            wish = self._lowest(), GripReason.MARGIN
+            target = self._lowest(), GripReason.MARGIN
         # UNKNOWN never lowers a force.
         elif is_calm and self._all_known:
-            wish = self._relaxed(scale, time, dt), _RELAX
+            target = self._relaxed(scale, time, dt), _RELAX
         else:
-            wish = scale, _NONE
-        return [wish] * len(touches)
+            target = scale, _NONE
+        return [target] * len(touches)
 
     def _lowest(self) -> float:
         """Return the lowest scale in calm: a slow hand needs a reserve until it responds."""

@@ -11,7 +11,7 @@ laws.
 from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
-from holdfast_grip.laws.base import Law, Touch, Wish
+from holdfast_grip.laws.base import ForceTarget, Law, Touch
 from holdfast_grip.laws.relaxation import Relaxation
 
 SLIP_CHANGE = 0.05
@@ -47,7 +47,7 @@ class WongZhu(Law):
         self._last = [touch.tangential for touch in touches]
         self._relaxations = [Relaxation(self.fall) for _ in touches]
 
-    def wishes(self, touches: Sequence[Touch], time: float, dt: float) -> list[Wish]:
+    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
         """Raise each finger that slips, or all; relax the others."""
         slips = []
         for k, touch in enumerate(touches):
@@ -57,11 +57,11 @@ class WongZhu(Law):
                 self._last[k] = touch.tangential
         if self.together and any(slips):
             slips = [True] * len(slips)
-        wishes: list[Wish] = []
+        targets: list[ForceTarget] = []
         for touch, relaxation, slipping in zip(touches, self._relaxations, slips, strict=True):
             if slipping:
                 relaxation.slipped(touch.scale, time)
-                wishes.append((touch.scale * self.gain, GripReason.SLIP))
+                targets.append((touch.scale * self.gain, GripReason.SLIP))
             else:
-                wishes.append(relaxation.wish(touch.scale, time, dt))
-        return wishes
+                targets.append(relaxation.target(touch.scale, time, dt))
+        return targets

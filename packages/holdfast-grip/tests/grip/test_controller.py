@@ -462,23 +462,23 @@ class TestUnits:
 
 
 class BrokenLaw(Fixed):
-    """Law that returns the given wishes."""
+    """Law that returns the given targets."""
 
-    def __init__(self, wishes):
-        self._given = wishes
+    def __init__(self, targets):
+        self._given = targets
 
-    def wishes(self, touches, time, dt):
+    def targets(self, touches, time, dt):
         return self._given
 
 
 @pytest.mark.parametrize(
-    ("wishes", "given_text"),
+    ("targets", "given_text"),
     [
-        ([(1.0, GripReason.NONE)], "1 wishes given"),
+        ([(1.0, GripReason.NONE)], "1 targets given"),
         ([(math.nan, GripReason.SLIP)] * len(FINGERS), "a scale of nan given"),
     ],
 )
-def test_a_law_that_breaks_its_contract_is_named_with_it(wishes, given_text):
-    controller, time = holding(BrokenLaw(wishes))
+def test_a_law_that_breaks_its_contract_is_named_with_it(targets, given_text):
+    controller, time = holding(BrokenLaw(targets))
     with pytest.raises(ValueError, match=f"BrokenLaw.*{given_text}"):
         run(controller, time, 0.1)

@@ -18,7 +18,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.progress import format_size, progress
 
 if TYPE_CHECKING:
-    from holdfast.recording_import import ImportResult
+    from holdfast.import_tasks import ImportResult
     from holdfast_interop.datasets import PublicFile, PublicSet
 
 
@@ -72,8 +72,8 @@ def datasets(
     if action is DatasetAction.LIST:
         print_set(name, as_json=as_json) if name else print_sets(as_json=as_json)
         return
+    from holdfast.import_tasks import ImportTask, import_all
     from holdfast.parallel import Engine
-    from holdfast.recording_import import ImportTask, import_all
 
     public, files = select_files(name, only or [], with_checksum)
     download_files(public, files, mirror, progress)

@@ -17,7 +17,7 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_tables import in_memory, recordings_of_arrays
+from holdfast.io.importers.array_conversion import in_memory, recordings_of_arrays
 from holdfast.io.importers.arrays import arrays_of_columns
 from holdfast.io.importers.csv_columns import Columns
 from holdfast.io.importers.table import natural_order
@@ -171,11 +171,11 @@ def read_episodes(path: Path) -> Iterator[_Episode]:
             )
         for batch in parquet.iter_batches(EPISODES_AT_ONCE, columns=list(_EPISODE_COLUMNS)):
             for row in batch.to_pylist():
-                place = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
+                index = {f"{what}_index": int(row[f"data/{what}_index"]) for what in _FILE_PARTS}
                 yield _Episode(
                     int(row["episode_index"]),
                     int(row["length"]),
-                    path / DATA_PATH.format(**place),
+                    path / DATA_PATH.format(**index),
                     decode_header(row[HEADER_COLUMN], path),
                     msgspec.json.decode(row[TEXTS_COLUMN], type=dict[str, list[str]]),
                 )

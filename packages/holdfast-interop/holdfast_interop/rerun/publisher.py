@@ -175,7 +175,7 @@ class RerunPublisher(Openable):
     def _draw(self, readings: Mapping[str, Array]) -> None:
         for name, taxels in readings.items():
             state = self._states.get(name, ContactState.UNKNOWN)
-            places = self._stream.fingers[name].positions
+            positions = self._stream.fingers[name].positions
             forces = np.einsum("nij,nj->ni", self._stream.fingers[name].rotations, taxels)
             forces = np.nan_to_num(forces, nan=0.0, posinf=0.0, neginf=0.0)
             if state in TOUCHED:
@@ -183,7 +183,7 @@ class RerunPublisher(Openable):
             vectors = forces * (LONGEST_ARROW / self._largest if self._largest > 0 else 0.0)
             shown = long_enough(vectors) & (state in TOUCHED)
             arrows = rr.Arrows3D(
-                vectors=vectors[shown], origins=places[shown], radii=ARROW_RADIUS,
+                vectors=vectors[shown], origins=positions[shown], radii=ARROW_RADIUS,
                 colors=ARROW_COLOURS[state],
             )  # fmt: skip
             self._view.log(f"{self._paths[name]}/arrows", arrows)

@@ -57,8 +57,8 @@ def draw_hand(stream: Any, recording: Recording, frames: Sequence[Frame]) -> dic
     """Write the taxels as points, and the first pose of each frame; return a path by module."""
     parts = frame_parts(frames)
     for frame in frames:
-        place, turned = frame.poses[0][:3], frame.poses[0][[4, 5, 6, 3]]
-        pose = rr.Transform3D(translation=place, quaternion=rr.Quaternion(xyzw=turned))
+        position, turned = frame.poses[0][:3], frame.poses[0][[4, 5, 6, 3]]
+        pose = rr.Transform3D(translation=position, quaternion=rr.Quaternion(xyzw=turned))
         stream.log(entity(*parts[frame.name]), pose, static=len(frame.times) == 1)
     paths = {name: entity(*parts[module_frame(name)]) for name in recording.modules}
     for name, module in recording.modules.items():

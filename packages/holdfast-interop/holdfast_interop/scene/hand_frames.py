@@ -104,8 +104,8 @@ def frames_of(recording: Recording) -> list[Frame]:
         links = allegro_links(angles)
         for name in on_hand:
             link, mount = mounts[name]
-            place, turned = links[link]
-            tracks[name].append(_pose((place + turned @ mount[0], turned @ mount[1])))
+            position, turned = links[link]
+            tracks[name].append(_pose((position + turned @ mount[0], turned @ mount[1])))
     frames = [
         Frame(module_frame(name), PALM_LINK, times, np.array(track))
         for name, track in tracks.items()
@@ -149,7 +149,7 @@ def allegro_links(joints: Array) -> dict[str, RigidPose]:
     poses: dict[str, RigidPose] = {PALM_LINK: (np.zeros(3), np.eye(3))}
     # The table has parents before their links.
     for row in csv.DictReader(line for line in lines if not line.startswith("#")):
-        place, rotation = poses[row["parent"]]
+        position, rotation = poses[row["parent"]]
         joint = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
         axis = np.array([float(row[f"axis_{a}"]) for a in "xyz"])
         offset = np.array([float(row[a]) for a in "xyz"])
@@ -158,7 +158,7 @@ def allegro_links(joints: Array) -> dict[str, RigidPose]:
         x, y, z = np.eye(3)
         fixed = rotation_about(z, yaw) @ rotation_about(y, pitch) @ rotation_about(x, roll)
         turned = rotation @ fixed @ rotation_about(axis, float(joints[joint]))
-        poses[row["link"]] = place + rotation @ offset, turned
+        poses[row["link"]] = position + rotation @ offset, turned
     return poses
 
 

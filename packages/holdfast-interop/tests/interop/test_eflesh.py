@@ -120,8 +120,8 @@ def test_cut_and_damaged_files(tmp_path):
     for size in range(1, len(data), len(data) // 9):
         path.write_bytes(data[:size])
         assert refusal(path).startswith(f"{path} is cut or damaged: ")
-    place = data.index(VALUES.tobytes()[:64]) + 100
-    path.write_bytes(data[:place] + bytes([data[place] ^ 1]) + data[place + 1 :])
+    offset = data.index(VALUES.tobytes()[:64]) + 100
+    path.write_bytes(data[:offset] + bytes([data[offset] ^ 1]) + data[offset + 1 :])
     assert refusal(path).startswith(f"{path} is cut or damaged: ")
 
 

@@ -26,10 +26,10 @@ def test_links_are_those_of_the_twin():
     mujoco.mj_kinematics(model, data)
     palm = data.body("palm")
     turn = palm.xmat.reshape(3, 3)
-    for name, (place, rotation) in allegro_links(joints).items():
+    for name, (position, rotation) in allegro_links(joints).items():
         if name != "palm_link":
             body = data.body(name)
-            assert np.abs(palm.xpos + turn @ place - body.xpos).max() < 1e-9, name
+            assert np.abs(palm.xpos + turn @ position - body.xpos).max() < 1e-9, name
             assert np.abs(turn @ rotation - body.xmat.reshape(3, 3)).max() < 1e-9, name
 
 
@@ -51,11 +51,11 @@ def test_taxels_are_where_the_hand_has_them():
     links |= {"thumb_link3": links["link_15.0"], "index_link1": links["link_1.0"]}
     for frame, name in zip(frames[1:], names, strict=True):
         known = hand("allegro-uskin").modules[name]
-        place, turn = links[known.link]
+        position, turn = links[known.link]
         pose = frame.at(5.0)
         turned = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_matrix()
         got = pose[:3] + known.sensor.positions @ turned.T
-        assert np.abs(got - (place + known.positions @ turn.T)).max() < 1e-5
+        assert np.abs(got - (position + known.positions @ turn.T)).max() < 1e-5
 
 
 def test_measured_joints_move_the_fingers():

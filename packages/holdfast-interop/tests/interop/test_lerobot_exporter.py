@@ -98,15 +98,15 @@ def test_an_episode_is_a_row_group_and_says_where_it_is(data_set):
     assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [346, 346]
     rows = pq.read_table(data_set / EPISODES).to_pylist()
     plain = [{k: v for k, v in row.items() if not k.startswith("holdfast.")} for row in rows]
-    places = {
+    indices = {
         f"{what}/{part}_index": 0
         for what in ("data", "meta/episodes")
         for part in ("chunk", "file")
     }
     assert plain == [
-        {"episode_index": 0, "tasks": ["grasp object 0"], "length": 346, **places,
+        {"episode_index": 0, "tasks": ["grasp object 0"], "length": 346, **indices,
          "dataset_from_index": 0, "dataset_to_index": 346},
-        {"episode_index": 1, "tasks": ["lift the cup"], "length": 346, **places,
+        {"episode_index": 1, "tasks": ["lift the cup"], "length": 346, **indices,
          "dataset_from_index": 346, "dataset_to_index": 692},
     ]  # fmt: skip
 

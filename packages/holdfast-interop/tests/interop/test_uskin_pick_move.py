@@ -18,28 +18,28 @@ def write(path, names, values):
 @pytest.fixture
 def folder(tmp_path):
     """A made recording of twelve samples: two stable, four of slip, six lost."""
-    place = tmp_path / "data_sample_1"
-    place.mkdir()
+    folder = tmp_path / "data_sample_1"
+    folder.mkdir()
     k = np.arange(N)
     taxels = [f"txl{t + 1}_{axis}" for t in range(16) for axis in "xyz"]
     for finger in (1, 2):
         values = 1000.0 * finger + np.arange(48) + k[:, None]
-        write(place / f"xela_sensor{finger}.csv", taxels, values)
+        write(folder / f"xela_sensor{finger}.csv", taxels, values)
     robot = [f"position_joint{j + 1}" for j in range(7)]
     robot += [f"velocity_joint{j + 1}" for j in range(7)]
     robot += [f"ee_T_{row}{column}" for column in range(4) for row in range(4)]
     robot += ["v_x", "v_y", "time"]
     values = np.arange(33) + 100.0 * k[:, None]
     values[:, -1] = k / 64
-    write(place / "robot_state.csv", robot, values)
+    write(folder / "robot_state.csv", robot, values)
     marker = [f"marker_position_{axis}" for axis in "xyz"]
     marker += [f"marker_quaternion_{axis}" for axis in "xyzw"]
     poses = np.tile([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7], (N, 1))
     poses[6:] = 10.0
-    write(place / "marker.csv", marker, poses)
-    write(place / "slip_label.csv", ["slip", "fail"], np.stack([k >= 2, k >= 6], axis=1) * 1.0)
-    write(place / "meta_data.csv", ["dropped", "notes"], [[0, "fine"]])
-    return place
+    write(folder / "marker.csv", marker, poses)
+    write(folder / "slip_label.csv", ["slip", "fail"], np.stack([k >= 2, k >= 6], axis=1) * 1.0)
+    write(folder / "meta_data.csv", ["dropped", "notes"], [[0, "fine"]])
+    return folder
 
 
 def test_all_comes_along(folder):

@@ -27,7 +27,7 @@ class JointOrder:
     def __init__(self, joints: Mapping[str, Sequence[str]]) -> None:
         self.fingers = tuple(joints)
         self.names = tuple(name for names in joints.values() for name in names)
-        self._places = [
+        self._joints = [
             (finger, joint) for finger, names in joints.items() for joint in range(len(names))
         ]
 
@@ -37,12 +37,12 @@ class JointOrder:
 
     def scales(self, command: GripCommand) -> Array:
         """Return the force scale (n_joints,) of each joint; 1 for fingers without a command."""
-        commands = [command.fingers.get(finger) for finger, _ in self._places]
+        commands = [command.fingers.get(finger) for finger, _ in self._joints]
         return np.array([1.0 if one is None else one.scale for one in commands])
 
     def describe(self, joint: int) -> str:
         """Return the finger and the number of a joint in it, from 0: "index joint 2"."""
-        finger, number = self._places[joint]
+        finger, number = self._joints[joint]
         return f"{finger} joint {number}"
 
     def sort(self, states: JointStates) -> JointStates:
@@ -55,15 +55,15 @@ class JointOrder:
         """
         names, n = states.names, len(states.positions)
         if not names and n == len(self.names):
-            places = list(range(n))
+            indices = list(range(n))
         # A publisher may name more joints than it sends positions of.
         elif missing := [name for name in self.names if name not in names[:n]]:
             have = ", ".join(names[:4]) + (", ..." if len(names) > 4 else "")
             raise ValueError(f"no joint {missing[0]} (there are {have or 'no names'})")
         else:
-            places = [names.index(name) for name in self.names]
-        efforts = states.efforts[places] if len(states.efforts) >= n else states.efforts[:0]
-        sorted_states = JointStates(self.names, states.positions[places], efforts)
+            indices = [names.index(name) for name in self.names]
+        efforts = states.efforts[indices] if len(states.efforts) >= n else states.efforts[:0]
+        sorted_states = JointStates(self.names, states.positions[indices], efforts)
         for values in sorted_states[1:]:
             if not np.isfinite(np.asarray(values)).all():
                 raise ValueError("a value is not finite")

@@ -4,7 +4,7 @@ import pytest
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings, save_recording
-from holdfast.io.recording_files import is_recording
+from holdfast.io.file_formats import is_recording
 from holdfast.sensors import hand
 from holdfast.synthetic import synthetic_recording
 from holdfast_ros.sensor_messages import DeviceSample

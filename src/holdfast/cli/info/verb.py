@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.info.tables import print_folder, print_model, print_recording
+from holdfast.cli.info.text import print_folder, print_model, print_recording
 from holdfast.cli.options import JsonOption, PlotOptions, TareOption
 from holdfast.cli.terminal.console import print_error, print_json
 from holdfast.cli.terminal.progress import progress

@@ -60,7 +60,7 @@ class GraspOptions:
         Raises:
             ValueError: an unknown object, case, profile or fault, or a number out of range.
         """
-        from holdfast.twin_recordings import plan_grasps
+        from holdfast.simulated_grasps import plan_grasps
 
         table = None if self.table is None else engine.path(self.table)
         return plan_grasps(

@@ -69,8 +69,8 @@ def simulate(
         text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
         from holdfast.files import refuse_overwrite, whole_file
+        from holdfast.simulated_grasps import film_all, simulate_grasps
         from holdfast.twin import render
-        from holdfast.twin_recordings import film_all, simulate_grasps
 
         if film is not None:
             render.check_film(film)

@@ -18,7 +18,7 @@ from holdfast.errors import HoldfastError, SourceError, TrainingError
 from holdfast.labelling.taught_grasps import Slide, label_grasp, throw_away, write_pictures
 from holdfast.live.camera import CameraRecorder
 from holdfast.live.recorder import Recorder
-from holdfast.live.source_recording import create_recorder
+from holdfast.live.recorder_setup import create_recorder
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import TARE_SECONDS, GuidedProtocol, Stage
@@ -124,7 +124,7 @@ class Guide:
                 raise TrainingError(f"stopped in step {protocol.step.name}")
         except HoldfastError as failure:
             n, path = len(self._folder.kept), self._folder.path
-            rest = f"{n} of {protocol.n_places} grasps are in {path}: go on with --resume"
+            rest = f"{n} of {protocol.n_grasps} grasps are in {path}: go on with --resume"
             raise type(failure)(f"{failure}; {rest}") from failure
 
     def _step(self, screen: TeachScreen, keys: MarkerKeys) -> None:
@@ -151,9 +151,9 @@ class Guide:
             self._recorder.close()  # it raises what failed
         if self._source.ended and protocol.stage not in WAITING_STAGES:
             raise SourceError(f"{self._source.name} ended in step {protocol.step.name}")
-        place = f"{len(self._folder.kept)} of {protocol.n_places} grasps"
+        progress = f"{len(self._folder.kept)} of {protocol.n_grasps} grasps"
         if protocol.stage is not Stage.OVER:
-            screen.show(protocol.view(), place)
+            screen.show(protocol.view(), progress)
 
     def _ask(self, twin: AskedTwin, screen: TeachScreen) -> None:
         """Ask the twin for the grasp that begins, or for another one if it has failed."""
@@ -177,7 +177,7 @@ class Guide:
                 self._slides = throw_away(self._path, int(thrown[1]))
             except ValueError as refusal:
                 screen.print(str(refusal))
-            self._judge("", screen)
+            self._report_grasp("", screen)
         elif text in ("next", "repeat", "skip", "quit"):
             n_results = len(protocol.results)
             self._follow(protocol.press(text), screen)
@@ -236,9 +236,9 @@ class Guide:
     def _show_result(self, checked: Checked, screen: TeachScreen) -> None:
         self._checking = None
         self._slides, note = checked
-        self._judge(note, screen)
+        self._report_grasp(note, screen)
 
-    def _judge(self, note: str, screen: TeachScreen) -> None:
+    def _report_grasp(self, note: str, screen: TeachScreen) -> None:
         protocol, slides = self.protocol, self._slides
         n_slides = None if slides is None else len(slides)
         protocol.checked(self._path.stem, self._seconds, n_slides, note)

@@ -31,12 +31,12 @@ SAFETY = (
 """What a person confirms before the protocol begins."""
 
 
-def screen_lines(view: "View", place: str) -> list[str]:
+def screen_lines(view: "View", progress: str) -> list[str]:
     """Return the lines of the screen, each at most 80 characters.
 
     Args:
         view: what a person sees.
-        place: how far the protocol is.
+        progress: how far the protocol is.
     """
     large = "   ".join(" ".join(word) for word in view.words.split())
     left = "" if view.left is None else f"{view.left:.0f} s"
@@ -44,7 +44,7 @@ def screen_lines(view: "View", place: str) -> list[str]:
     bar = "#" * done + "-" * (BAR_WIDTH - done) if view.share or view.left is not None else ""
     room = SCREEN_WIDTH - len(view.title)
     lines = [
-        "", f"{view.title}{place:>{room}}", "",
+        "", f"{view.title}{progress:>{room}}", "",
         f"  {large:<{SCREEN_WIDTH - 10}}{left:>8}", f"  {bar}".rstrip(), "",
         f"  {view.hint}".rstrip(), f"  {visible(view.message)}".rstrip(), "",
         TEACH_KEY_HELP if view.decides else ACTIVE_KEY_HELP,
@@ -63,7 +63,7 @@ class TeachScreen(LiveDisplay):
         super().__init__()
         self._shown, self._is_read = "", is_read
 
-    def show(self, view: "View", place: str) -> None:
+    def show(self, view: "View", progress: str) -> None:
         """Show what a person sees now; elsewhere than on a terminal, what has changed."""
         if self._live is None:
             text = ": ".join(filter(None, (view.title, view.words, view.message * view.decides)))
@@ -71,7 +71,7 @@ class TeachScreen(LiveDisplay):
                 print_message(text)
             self._shown = text
             return
-        lines = screen_lines(view, place)
+        lines = screen_lines(view, progress)
         text = "\n".join(lines)
         if text != self._shown:
             from rich.text import Text

@@ -48,7 +48,7 @@ def visible_json(text: str) -> str:
 def _json_escape(character: str) -> str:
     # Escapes of JSON are units of UTF-16; file names that are not UTF-8 have lone surrogates.
     units = character.encode("utf-16-be", "surrogatepass").hex()
-    return "".join(f"\\u{units[place : place + 4]}" for place in range(0, len(units), 4))
+    return "".join(f"\\u{units[k : k + 4]}" for k in range(0, len(units), 4))
 
 
 _silence: Timer | None = None

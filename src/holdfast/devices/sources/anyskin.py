@@ -4,7 +4,7 @@ A board sends one packet a sample, binary or text, by its firmware (the sketches
 authors). Binary: four little-endian float32 of each magnetometer (temperature, x, y, z), then CR
 LF. Text: x, y, z and temperature of each magnetometer, separated by tabs, then CR LF. x, y, z are
 in microtesla. Only the end of a packet marks the beginning of the next one, and a number may
-contain CR LF. Therefore the bytes after CR LF are a packet if it ends at the expected place and
+contain CR LF. Therefore the bytes after CR LF are a packet if it ends at the expected offset and
 every number is plausible.
 """
 
@@ -99,7 +99,7 @@ class AnySkinDecoder:
         return DecodedBytes(samples, self._n_refused - before, self._other_n_mags)
 
     def _step(self, at: int, samples: list[Sample]) -> int | None:
-        """Decode or skip the bytes at a place; return where they end, None if more are needed."""
+        """Decode or skip the bytes at an offset; return where they end, None if more are needed."""
         begins = self._buffer[at - 1 : at] == b"\n" if at else self._after_line
         # Text before binary: hardly any binary packet has digits and blanks only.
         if begins and (line := _LINE.match(self._buffer, at)):
@@ -141,7 +141,7 @@ def _length(n_mags: int) -> int:
 
 
 def _packet(data: bytes, at: int, n_mags: int) -> Sample | None:
-    """Return the sample of a binary packet at a place, or None if there is none."""
+    """Return the sample of a binary packet at an offset, or None if there is none."""
     end = at + _length(n_mags)
     if data[end - len(END) : end] != END:
         return None
@@ -175,10 +175,10 @@ def _other_n_mags(data: bytes, n_mags: int) -> int:
     """Return the unexpected number of magnetometers of two successive packets, 0 for none."""
     for count in range(1, MAX_OTHER_MAGS + 1):
         # Two in a row: one would be found by chance in other packets.
-        place = data.find(END)
-        while count != n_mags and place >= 0:
-            at = place + len(END)
+        end = data.find(END)
+        while count != n_mags and end >= 0:
+            at = end + len(END)
             if all(_packet(data, at + k * _length(count), count) is not None for k in range(2)):
                 return count
-            place = data.find(END, place + 1)
+            end = data.find(END, end + 1)
     return 0

@@ -75,18 +75,18 @@ def import_recordings(
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
             `columns` are given for a format that does not take them.
     """
-    place, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
-    name = _format_of(place, format, sensors, given)
-    with recording_errors(place):
+    path, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
+    name = _format_of(path, format, sensors, given)
+    with recording_errors(path):
         source = importer(name)
         if extra := extra_of(name):
             require_extras(extra)
         # The generic CSV itself gives names to the recordings of a folder.
-        parts = {place: ""} if name == "csv" else name_prefixes(source.parts(place))
+        parts = {path: ""} if name == "csv" else name_prefixes(source.parts(path))
 
     # Not a generator itself: a wrong path is refused by the call, not by the first recording.
     def recordings() -> Iterator[Recording]:
-        with recording_errors(place):
+        with recording_errors(path):
             for part, prefix in parts.items():
                 if not part.is_dir():
                     check_regular(part)
@@ -125,12 +125,12 @@ def import_parts(
         RecordingError: `path` does not exist, no format fits, or the folder has no such file.
         ValueError: as `import_recordings`.
     """
-    place, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
-    name = _format_of(place, format, sensors, given)
-    with recording_errors(place):
+    path, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
+    name = _format_of(path, format, sensors, given)
+    with recording_errors(path):
         source = importer(name)
         more = (given, sensors) if name == "csv" else ()
-        parts: list[Path] = source.parts(place, *more)
+        parts: list[Path] = source.parts(path, *more)
     return name, parts
 
 

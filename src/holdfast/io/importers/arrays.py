@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError, require_extras
-from holdfast.io.importers.array_tables import (
+from holdfast.io.importers.array_conversion import (
     StoredArray,
     StoredArrays,
     arrays_of_records,

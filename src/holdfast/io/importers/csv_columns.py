@@ -336,9 +336,9 @@ def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:
         letter, axis = token[-1].lower(), {k: token[:-1] + "{axis}"}
         for number in numbers:
             both = axis | {number: "{taxel}"}
-            pattern = "".join(both.get(place, word) for place, word in enumerate(tokens))
+            pattern = "".join(both.get(index, word) for index, word in enumerate(tokens))
             yield pattern, (int(tokens[number]), letter)
-        yield "".join(axis.get(place, word) for place, word in enumerate(tokens)), (1, letter)
+        yield "".join(axis.get(index, word) for index, word in enumerate(tokens)), (1, letter)
 
 
 def _with_module(patterns: Sequence[str]) -> str:

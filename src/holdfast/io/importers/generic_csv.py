@@ -22,7 +22,7 @@ from holdfast.io.importers.table import (
     read_head,
     read_table,
 )
-from holdfast.io.importers.table_recordings import (
+from holdfast.io.importers.table_conversion import (
     DEFAULT_MODULE,
     TIME,
     Report,
@@ -128,8 +128,8 @@ def _recordings(
             numbers: set[str | None] = {*used, chosen.time}
             # Times without a unit may be those of a wall clock, which are cells of text.
             if chosen.time in head.names and chosen.time_unit is None:
-                place = head.names.index(chosen.time)
-                cells = head.first_row[place : place + 1]
+                index = head.names.index(chosen.time)
+                cells = head.first_row[index : index + 1]
                 if cells and clock_seconds(cells) is not None:
                     numbers = set(used)
             return read_table(path, [name for name in head.names if name not in numbers], head)

@@ -1,4 +1,4 @@
-"""Tables of numbers in CSV files; errors name the place of a wrong cell."""
+"""Tables of numbers in CSV files; errors name the row and column of a wrong cell."""
 
 import codecs
 import csv
@@ -84,14 +84,14 @@ class Table(NamedTuple):
         Raises:
             RecordingError: a column is missing.
         """
-        places = {name: place for place, name in reversed(list(enumerate(self.names)))}
-        if missing := [name for name in names if name not in places]:
+        indices = {name: index for index, name in reversed(list(enumerate(self.names)))}
+        if missing := [name for name in names if name not in indices]:
             raise RecordingError(
                 f"{self.path}: column {missing[0]!r} is missing"
                 f"{f' and {len(missing) - 1} more' if len(missing) > 1 else ''}; "
                 f"it has {some_names(self.names)}"
             )
-        return self.values[:, [places[name] for name in names]]
+        return self.values[:, [indices[name] for name in names]]
 
 
 def header_line(path: Path) -> tuple[str, ...]:
@@ -142,7 +142,7 @@ def read_table(
     values = np.frombuffer(numbers).reshape(-1, len(names))
     return (
         Table(path, names, values, first_line, head.comments),
-        {names[place]: column for place, column in cells.items()},
+        {names[index]: column for index, column in cells.items()},
     )
 
 
@@ -196,10 +196,10 @@ def _numbers(
         raise RecordingError(
             f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in the header"
         )
-    for place, column in cells.items():
-        row[place].encode()
-        column.append(row[place])
-        row[place] = ""
+    for index, column in cells.items():
+        row[index].encode()
+        column.append(row[index])
+        row[index] = ""
     row = points.converted(number, row)
     if not _OTHER_FORMS.search("".join(row)):
         with suppress(ValueError):  # a cell is empty or wrong
@@ -304,8 +304,8 @@ class CsvFormat(NamedTuple):
 
 
 @contextmanager
-def errors_named(place: object) -> Iterator[None]:
-    """Add the path of a file, or another place, to the errors that do not have it.
+def errors_named(source: object) -> Iterator[None]:
+    """Add the path of a file, or another source, to the errors that do not have it.
 
     Raises:
         RecordingError: the block raised one.
@@ -314,7 +314,7 @@ def errors_named(place: object) -> Iterator[None]:
         yield
     except RecordingError as cause:
         text = str(cause)
-        raise RecordingError(text if str(place) in text else f"{place}: {text}") from cause
+        raise RecordingError(text if str(source) in text else f"{source}: {text}") from cause
 
 
 def natural_order(path: Path) -> list[str | int]:

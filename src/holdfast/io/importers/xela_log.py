@@ -37,9 +37,9 @@ def read(path: Path) -> Iterator[Recording]:
             f"({allegro.n_taxels} taxels x 3 axes of {WHOLE_HAND})"
         )
     # The first column if none has a name with "time".
-    place = next((k for k, name in enumerate(table.names) if "time" in name.lower()), 0)
-    times = table.values[:, place]
-    readings = with_integer_type(np.delete(table.values, place, axis=1))
+    index = next((k for k, name in enumerate(table.names) if "time" in name.lower()), 0)
+    times = table.values[:, index]
+    readings = with_integer_type(np.delete(table.values, index, axis=1))
     unit = "count" if np.issubdtype(readings.dtype, np.integer) else "N"
     with errors_named(path):
         modules = {

@@ -241,8 +241,8 @@ def with_oddities(findings: list[Finding], scan: FindingsScan, path: Path) -> li
 def _gaps(module: Tactile, origin: float) -> str:
     """Return how many gaps a module has, with the longest ones in the order of time."""
     steps = np.diff(module.times)
-    places = np.sort(np.argsort(-steps)[: min(module.n_gaps, MAX_GAPS_SHOWN)])
-    shown = ", ".join(f"{steps[k]:.3g} s at {module.times[k] - origin:.2f} s" for k in places)
+    indices = np.sort(np.argsort(-steps)[: min(module.n_gaps, MAX_GAPS_SHOWN)])
+    shown = ", ".join(f"{steps[k]:.3g} s at {module.times[k] - origin:.2f} s" for k in indices)
     first = "the longest " if module.n_gaps > MAX_GAPS_SHOWN else ""
     text = f"{module.n_gaps} gap{'s' if module.n_gaps > 1 else ''}: {first}{shown}; features begin "
     return text + "again after each: look for lost packets (holdfast doctor SOURCE)"

@@ -7,7 +7,7 @@ import numpy as np
 
 from holdfast.detection.plan import first_finite
 from holdfast.kernel.batch import fill_fingertip_force
-from holdfast.labelling.server.long_recordings import force_sensor
+from holdfast.labelling.server.fingertip_forces import force_sensor
 from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors.types import Array, Flags

@@ -5,7 +5,7 @@ So the motion that is seen is explained by the force that is felt, and by how th
 
     q = C F + L r + d
 
-q is the place of a fingertip on the object, in the plane of the object's sticker, F its force, r
+q is the position of a fingertip on the object, in the plane of the object's sticker, F its force, r
 the turns of both bodies. C and L are fitted to changes, by the least sum of distances, in which
 sliding is an outlier. What remains, d, is flat while the finger sticks, and moves for good when it
 has slid.
@@ -111,11 +111,11 @@ def propose(
         tips = dict.fromkeys(recording.modules, moved)
     elif video is not None:
         source, kind = Path(video), "video"
-        times, levels, places = _filmed(source, fps)
+        times, levels, poses = _filmed(source, fps)
         if fps is None and stamps_path(source).exists():
             expected = -USUAL_DELAY  # the stamps are on the clock of the samples
         flash = flash_offset(recording, times, levels)
-        tips = tip_motions(times, places, stickers_of(recording, bodies), rule, source)
+        tips = tip_motions(times, poses, stickers_of(recording, bodies), rule, source)
         grid = regular_grid(times)
     else:
         raise ValueError("neither a video nor a motion given")
@@ -129,7 +129,7 @@ def propose(
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
         force = force_of(recording, finger, how)(at)
-        slips, stuck, rest = [], held, tip.place
+        slips, stuck, rest = [], held, tip.position
         for time in FIT_TIMES:
             n = n_samples_of(time, grid[1] - grid[0])
             rest = unexplained(tip, force, stuck, n)
@@ -151,10 +151,10 @@ def _filmed(video: Path, fps: float | None) -> tuple[Array, Array, dict[int, Arr
     if stamps is None:
         return read_stickers(video, fps)
     # With one picture a second, the time of a picture is its number.
-    numbers, levels, places = read_stickers(video, 1.0)
+    numbers, levels, poses = read_stickers(video, 1.0)
     kept = numbers < len(stamps)  # a process that was killed may have lost the last stamps
     times = stamps[numbers[kept].astype(int)]
-    return times, levels[kept], {k: place[kept] for k, place in places.items()}
+    return times, levels[kept], {k: pose[kept] for k, pose in poses.items()}
 
 
 def stickers_of(recording: Recording, bodies: Mapping[str, int] | None = None) -> dict[str, int]:
@@ -196,10 +196,10 @@ def unexplained(tip: TipMotion, force: Array, held: Mask, n: int) -> Array:
     both = held[n:] & held[:-n]
     if both.sum() < 4 * known.shape[1]:
         # Too few changes for a fit: no motion remains, and so no slip.
-        return tip.place - tip.place
+        return tip.position - tip.position
     change = known[n:] - known[:-n]
-    fit, _ = robust_fit(change[both], (tip.place[n:] - tip.place[:-n])[both])
-    return np.asarray(tip.place - known @ fit)
+    fit, _ = robust_fit(change[both], (tip.position[n:] - tip.position[:-n])[both])
+    return np.asarray(tip.position - known @ fit)
 
 
 def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[SeenSlip]:
@@ -237,7 +237,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         start = max(min(start, end - 4), 0)  # a change point needs four values or more
         along = rest[end] - before
         line = (rest[start : end + 1] - before) @ along / max(float(np.linalg.norm(along)), 1e-9)
-        # Noise of at least 0.005 mm: the place of a sticker is exact to 0.01 mm.
+        # Noise of at least 0.005 mm: the position of a sticker is exact to 0.01 mm.
         onset, error = change_point(times[start : end + 1], line, max(single, 0.005))
         path = np.linalg.norm(np.diff(mean_over(rest[first:last], 3), axis=0), axis=1).sum()
         distance = max(float(path), float(away))

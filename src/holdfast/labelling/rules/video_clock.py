@@ -115,7 +115,7 @@ def video_clock(
         force_at = force_of(recording, finger, tare)
         loaded = np.linalg.norm(force_at(grid + coarse), axis=1)
         held = ((loaded > FITTED_SHARE) & tip.seen)[1:-1]
-        jerks = np.diff(tip.place, 2, axis=0)
+        jerks = np.diff(tip.position, 2, axis=0)
         size = mean_over(np.linalg.norm(jerks, axis=1), 5)
         if held.sum() < MIN_FITTED:
             continue
@@ -160,7 +160,7 @@ def _coarse_offset(
     shares: Array = np.zeros(len(grid) + len(own) - 2 * n - 1)
     for finger, tip in tips.items():
         force = force_of(recording, finger, tare)(own)
-        moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.place, force))
+        moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.position, force))
         products = np.array([[correlate(f, m) for f in felt.T] for m in moved.T])
         inverse = np.linalg.pinv(felt.T @ felt)
         explained = np.einsum("ijl,jk,ikl->l", products, inverse, products)

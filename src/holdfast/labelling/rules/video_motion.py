@@ -42,9 +42,9 @@ class VideoRule:
     Attributes:
         object_size: side of the black square on the object [m].
         tip_size: the same on fingertips [m].
-        window: time on either side of an instant over which places are averaged [s].
+        window: time on either side of an instant over which positions are averaged [s].
         step: least difference of the two where something may slide [m]; at least six times noise.
-        slid: least distance between the places before and after a slip [m].
+        slid: least distance between the positions before and after a slip [m].
         before: time before a slip that is fitted as stuck [s].
     """
 
@@ -63,14 +63,14 @@ class TipMotion(NamedTuple):
     """Motion of a fingertip on the object, on a regular grid of pictures.
 
     Attributes:
-        place: (n, 2) in the plane of the object's sticker, along its sides [mm]; of another
+        position: (n, 2) in the plane of the object's sticker, along its sides [mm]; of another
             measurement (n, 1) or (n, 3).
         turns: (n, 7) turn in the picture and tilts of both bodies [TURN_SCALE mm]; of another
             measurement (n, 3) or (n, 0).
         seen: (n,) where both stickers are seen.
     """
 
-    place: Array
+    position: Array
     turns: Array
     seen: Mask
 
@@ -83,7 +83,7 @@ def regular_grid(times: Array) -> Array:
 
 def tip_motions(
     times: Array,
-    places: Mapping[int, Array],
+    poses: Mapping[int, Array],
     stickers: Mapping[str, int],
     rule: VideoRule,
     video: Path,
@@ -92,7 +92,7 @@ def tip_motions(
 
     Args:
         times: (n,) of the pictures [s].
-        places: (n, 2, 3) of each sticker, see `holdfast.io.stickers`.
+        poses: (n, 2, 3) of each sticker, see `holdfast.io.stickers`.
         stickers: number of that of each body.
         rule: with the sizes.
         video: for messages.
@@ -101,7 +101,7 @@ def tip_motions(
         RecordingError: as `propose`.
     """
     shares = {
-        body: float(np.isfinite(places[k][:, 0, 0]).mean()) if k in places else 0.0
+        body: float(np.isfinite(poses[k][:, 0, 0]).mean()) if k in poses else 0.0
         for body, k in stickers.items()
     }
     good = [body for body, share in shares.items() if share >= MIN_SEEN]
@@ -115,7 +115,7 @@ def tip_motions(
             "(`holdfast label markers` prints them)"
         )
     grid = regular_grid(times)
-    tracks = {body: _track_at(grid, times, places[stickers[body]]) for body in good}
+    tracks = {body: _track_at(grid, times, poses[stickers[body]]) for body in good}
     scales = {body: _scale(track, grid) for body, (track, _) in tracks.items()}
     base, seen = tracks[OBJECT]
     turn, tilt = _turns(base)
@@ -144,11 +144,11 @@ def tip_motions(
         upright = np.column_stack(
             [across * away[:, 0] + along * away[:, 1], across * away[:, 1] - along * away[:, 0]]
         )
-        place = upright @ flatten.T
-        # Tilts are 50 times less exact than places, but not averaged: averages are late, and a push
-        # that rolls the object would remain as motion.
+        position = upright @ flatten.T
+        # Tilts are 50 times less exact than positions, but not averaged: averages are late, and a
+        # push that rolls the object would remain as motion.
         turns = np.column_stack([tip_turn - turn, tilt, tip_tilt])
-        motions[body] = TipMotion(place, TURN_SCALE * turns, seen & tip_seen)
+        motions[body] = TipMotion(position, TURN_SCALE * turns, seen & tip_seen)
     return motions
 
 
@@ -187,15 +187,15 @@ def measured_motion(path: Path, column: str | None = None) -> tuple[Array, TipMo
         values[1:, -4:] *= 1 - 2 * flips[:, None]
     grid = regular_grid(times)
     known = np.stack([np.interp(grid, times, part) for part in values.T], axis=1)
-    place, turns = 1e3 * known[:, : len(kinds[0])], known[:, :0]
+    position, turns = 1e3 * known[:, : len(kinds[0])], known[:, :0]
     if len(kinds[-1]) == 4:  # quaternions, with their scalar first
         if not (np.abs(np.linalg.norm(values[:, -4:], axis=1) - 1) < 0.1).all():
             raise RecordingError(f"{path}: unit quaternions qw,qx,qy,qz expected in each row")
         turned = Rotation.from_quat(np.roll(known[:, -4:], -1, axis=1))
         turns = TURN_SCALE * (turned * turned[0].inv()).as_rotvec()
-    if len(kinds[0]) == 4:  # no places: what turns slides at the edge of the contact
-        place, turns = 1e3 * SPIN_LEVER / TURN_SCALE * turns, turns[:, :0]
-    return grid, TipMotion(place, turns, covered(grid, times, MAX_UNSEEN_TIME))
+    if len(kinds[0]) == 4:  # no positions: what turns slides at the edge of the contact
+        position, turns = 1e3 * SPIN_LEVER / TURN_SCALE * turns, turns[:, :0]
+    return grid, TipMotion(position, turns, covered(grid, times, MAX_UNSEEN_TIME))
 
 
 def force_of(recording: Recording, finger: str, tare: Tare) -> Callable[[Array], Array]:
@@ -232,13 +232,13 @@ def robust_fit(known: Array, change: Array) -> tuple[Array, Array]:
         ridge = 1e-5 * len(known) * np.median(weights) * np.eye(known.shape[1])
         fit = np.linalg.solve(weighted.T @ known + ridge, weighted.T @ change)
         distances = np.linalg.norm(change - known @ fit, axis=1)
-        weights = 1 / np.maximum(distances, 0.02)  # below the noise of a place, all count alike
+        weights = 1 / np.maximum(distances, 0.02)  # below the noise of a position, all count alike
     return np.asarray(fit), np.asarray(distances)
 
 
-def _track_at(grid: Array, times: Array, places: Array) -> tuple[Array, Mask]:
-    """Return the places of a sticker (n, 2, 3) on the grid, and where it is seen."""
-    flat = places.reshape(len(places), 6)
+def _track_at(grid: Array, times: Array, poses: Array) -> tuple[Array, Mask]:
+    """Return the poses of a sticker (n, 2, 3) on the grid, and where it is seen."""
+    flat = poses.reshape(len(poses), 6)
     seen = np.isfinite(flat).all(axis=1)
     columns = [np.interp(grid, times[seen], column) for column in flat[seen].T]
     return np.stack(columns, axis=1).reshape(-1, 2, 3), covered(grid, times[seen], MAX_UNSEEN_TIME)

@@ -16,7 +16,7 @@ from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import Poses, poses_of
-from holdfast.labelling.server.long_recordings import (
+from holdfast.labelling.server.fingertip_forces import (
     load_for_labelling,
     read_header,
     without_force,

@@ -58,8 +58,8 @@ class TeachingFolder:
 
     def new_path(self, name: str) -> Path:
         """Return the path of the next recording, of a step of that name; no file has it."""
-        places = (self.path, self.aside)
-        used = [int(p.name[:3]) for place in places for p in place.glob("[0-9][0-9][0-9]-*.mcap")]
+        folders = (self.path, self.aside)
+        used = [int(p.name[:3]) for f in folders for p in f.glob("[0-9][0-9][0-9]-*.mcap")]
         return self.path / f"{max(used, default=0) + 1:03d}-{name}.mcap"
 
     def save(self, results: Iterable[GraspResult]) -> None:

@@ -155,15 +155,15 @@ class GuidedProtocol:
         self.message, self.n_begun = "", 0
         self._sensors, self._steps = sensors, steps
         over = {(result.name, result.number) for result in done if result.is_done}
-        places = [(step, k) for step in steps for k in range(1, step.n_grasps + 1)]
+        grasps = [(step, k) for step in steps for k in range(1, step.n_grasps + 1)]
         # Those that are left, the next one last.
-        self._left = [place for place in reversed(places) if (place[0].name, place[1]) not in over]
+        self._left = [grasp for grasp in reversed(grasps) if (grasp[0].name, grasp[1]) not in over]
         self._now = self._began = math.nan  # of the newest estimate, and of the stage
         self._since = math.nan  # since when what the stage waits for lasts
         self._touching: tuple[str, ...] = ()
         self._grips: dict[str, float] = {}  # mean force of each finger when it held last
         self._recording, self._seconds, self._n_slides = "", 0.0, 0
-        self.step, self.number = places[-1]
+        self.step, self.number = grasps[-1]
         self.stage = Stage.OVER
         self._begin()
 
@@ -173,7 +173,7 @@ class GuidedProtocol:
         return self.stage in RECORDED_STAGES
 
     @property
-    def n_places(self) -> int:
+    def n_grasps(self) -> int:
         """Number of grasps of the whole protocol."""
         return sum(step.n_grasps for step in self._steps)
 
@@ -228,7 +228,7 @@ class GuidedProtocol:
     def checked(
         self, recording: str, seconds: float, n_slides: int | None = None, note: str = ""
     ) -> None:
-        """Judge the grasp whose recording is complete.
+        """Accept or refuse the grasp whose recording is complete.
 
         Args:
             recording: its name.
@@ -237,7 +237,7 @@ class GuidedProtocol:
             note: why it is not known.
         """
         self._recording, self._seconds, self._n_slides = recording, seconds, n_slides or 0
-        self.passed, self.message = self._judge(n_slides, note)
+        self.passed, self.message = self._check_grasp(n_slides, note)
         self.stage = Stage.DECIDE
 
     def view(self) -> View:
@@ -373,11 +373,11 @@ class GuidedProtocol:
                 changes.append(float(np.percentile(change, 95)) / usual)
         return max(changes)
 
-    def _judge(self, n_slides: int | None, note: str) -> tuple[bool, str]:
+    def _check_grasp(self, n_slides: int | None, note: str) -> tuple[bool, str]:
         """Return whether the grasp was what the step asks for, and the result in one line."""
         step = self.step
         if step.check is Check.HEALTH:
-            return self._judge_health()
+            return self._check_health()
         if self._held < MIN_HELD_SHARE * step.seconds:
             return False, f"held for {self._held:.0f} s only, {step.seconds:.0f} s expected"
         good, bad = f"held for {self._held:.0f} s", ""
@@ -406,7 +406,7 @@ class GuidedProtocol:
                     bad = f"{seen}: {step.name} a little farther"
         return not bad, bad or good
 
-    def _judge_health(self) -> tuple[bool, str]:
+    def _check_health(self) -> tuple[bool, str]:
         modules: dict[str, ModuleHealth] = {}
         try:
             for name, samples in self._samples.items():

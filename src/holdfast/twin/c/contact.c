@@ -63,7 +63,7 @@ static wrench sum_nodes(
             clear_node(&bristles[i], &forces[i]);
             continue;
         }
-        const vec arm = apply(&r->rotation, n->place);
+        const vec arm = apply(&r->rotation, n->position);
         const vec point = add(arm, r->offset);
         const nearest found = probe(&object, point);
         const vec normal = found.gradient;

@@ -41,7 +41,7 @@ typedef struct {
  * own, so that compilers compute several at a time. */
 typedef struct {
     coupled nodes[MAX_COUPLED];
-    double x[MAX_COUPLED], y[MAX_COUPLED], z[MAX_COUPLED];    /* places [m] */
+    double x[MAX_COUPLED], y[MAX_COUPLED], z[MAX_COUPLED];    /* positions [m] */
     double ux[MAX_COUPLED], uy[MAX_COUPLED], uz[MAX_COUPLED]; /* displacement by all others [m] */
     double near[MAX_COUPLED];  /* nearness to the node whose force changes */
     size_t index[MAX_COUPLED]; /* of each among all nodes of the skin */
@@ -53,7 +53,7 @@ static void move_others(patch *p, const constants *c, size_t node, vec change)
 {
     const double softness = softness_of(c);
     const double *const row = &c->nearness[node * c->n_coupled];
-    const vec from = c->nodes[node].place, f = scaled(change, softness);
+    const vec from = c->nodes[node].position, f = scaled(change, softness);
     for (size_t i = 0; i < p->n; ++i) {
         p->near[i] = p->index[i] == node ? 0.0 : row[p->index[i]];
     }
@@ -83,7 +83,7 @@ static void settle_new(patch *p, const constants *c, size_t i)
     for (size_t j = 0; j < p->n; ++j) {
         const coupled *const k = &p->nodes[j];
         const double near = j == i ? 0.0 : row[p->index[j]];
-        const vec apart = subtract(c->nodes[node].place, c->nodes[p->index[j]].place);
+        const vec apart = subtract(c->nodes[node].position, c->nodes[p->index[j]].position);
         const double along = near * near * near * dot(apart, k->force);
         sum = add(sum, add(scaled(k->force, near), scaled(apart, along)));
     }
@@ -167,7 +167,7 @@ static void fill_patch(
             continue;
         }
         coupled *const k = &p->nodes[p->n];
-        const vec arm = apply(&r->rotation, c->nodes[i].place);
+        const vec arm = apply(&r->rotation, c->nodes[i].position);
         k->point = add(arm, r->offset);
         const nearest found = probe(c->solid, k->point);
         k->depth = -found.distance;
@@ -191,9 +191,9 @@ static void fill_patch(
         k->stretch = tangential(add(b->stretch, scaled(k->along, dt)), k->normal);
         k->force = b->force;
         p->index[p->n] = i;
-        p->x[p->n] = c->nodes[i].place.x;
-        p->y[p->n] = c->nodes[i].place.y;
-        p->z[p->n] = c->nodes[i].place.z;
+        p->x[p->n] = c->nodes[i].position.x;
+        p->y[p->n] = c->nodes[i].position.y;
+        p->z[p->n] = c->nodes[i].position.z;
         p->ux[p->n] = b->moved.x;
         p->uy[p->n] = b->moved.y;
         p->uz[p->n] = b->moved.z;

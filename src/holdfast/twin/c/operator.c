@@ -23,7 +23,7 @@
 
 /* Displacement [m] and speed [m/s] along an axis; of a tremor, those of an rms of 1. */
 typedef struct {
-    double place, speed;
+    double position, speed;
 } motion;
 
 static motion tremor_at(tremor t, double time, size_t axis)
@@ -31,7 +31,7 @@ static motion tremor_at(tremor t, double time, size_t axis)
     motion m = {0.0, 0.0};
     for (size_t k = 0; k < t.n; ++k) {
         const sinusoid s = t.sinusoids[axis * t.n + k];
-        m.place += s.amplitude * sin(s.rate * time + s.phase);
+        m.position += s.amplitude * sin(s.rate * time + s.phase);
         m.speed += s.amplitude * s.rate * cos(s.rate * time + s.phase);
     }
     return m;
@@ -42,7 +42,7 @@ static vec tremble(tremor t, double rms, double time, vec *speed)
 {
     const motion x = tremor_at(t, time, 0), y = tremor_at(t, time, 1), z = tremor_at(t, time, 2);
     *speed = scaled((vec){x.speed, y.speed, z.speed}, rms);
-    return scaled((vec){x.place, y.place, z.place}, rms);
+    return scaled((vec){x.position, y.position, z.position}, rms);
 }
 
 /* Return the rotation to an anchor, small angles: half the sum of r x r_anchor [rad]. */
@@ -63,8 +63,8 @@ static wrench hold_wrench(
     double time)
 {
     vec speed;
-    const vec place = tremble(t, rms, time, &speed);
-    const vec stretch = subtract(add(anchor->position, place), b->position);
+    const vec position = tremble(t, rms, time, &speed);
+    const vec stretch = subtract(add(anchor->position, position), b->position);
     vec force =
         add(scaled(stretch, HOLD_STIFFNESS), scaled(subtract(speed, b->velocity), HOLD_DAMPING));
     const vec turn = turn_to(&b->rotation, &anchor->rotation);
@@ -79,9 +79,9 @@ static wrench hold_wrench(
 static wrench guide_wrench(const body *b, const guide *g, double ahead, tremor t, double time)
 {
     vec speed;
-    const vec place = tremble(t, g->rms, time, &speed);
+    const vec position = tremble(t, g->rms, time, &speed);
     const vec moved = add(g->pose.position, scaled(g->velocity, ahead));
-    const vec stretch = subtract(add(moved, place), b->position);
+    const vec stretch = subtract(add(moved, position), b->position);
     const vec pace = subtract(add(g->velocity, speed), b->velocity);
     const vec turn = add(turn_to(&b->rotation, &g->pose.rotation), scaled(g->spin, ahead));
     return (wrench){
@@ -117,12 +117,12 @@ static wrench push_wrench(
 {
     const motion shaken = tremor_at(t, elapsed, 0);
     motion aimed = aim(style, d->depth, d->rate, elapsed, duration);
-    aimed.place += rms * shaken.place - PUSH_GAP;
+    aimed.position += rms * shaken.position - PUSH_GAP;
     aimed.speed += rms * shaken.speed;
     const double along = dot(d->direction, subtract(b->position, origin));
     const double pace = dot(d->direction, add_cross(b->velocity, b->spin, d->arm));
-    double pressed = d->stiffness * (aimed.place - along) + PUSH_DAMPING * (aimed.speed - pace);
-    if (aimed.place <= along) {
+    double pressed = d->stiffness * (aimed.position - along) + PUSH_DAMPING * (aimed.speed - pace);
+    if (aimed.position <= along) {
         pressed = 0.0;
     }
     const vec force = scaled(d->direction, smaller(larger(pressed, 0.0), PUSH_LIMIT));

@@ -62,7 +62,7 @@ typedef struct {
 
 /* A node of the skin. */
 typedef struct {
-    vec place;          /* in the fingertip frame [m] */
+    vec position;       /* in the fingertip frame [m] */
     double stiffness;   /* at small depths [N/m] */
     double path_length; /* of the path from the first node to it through all between them [m] */
 } node;

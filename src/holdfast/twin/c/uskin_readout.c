@@ -124,14 +124,14 @@ static double share_of_step(
 /* Read a taxel, and set the counts that it shows: the mean of its last readings, rounded. */
 static void read_taxel(const readout_constants *c, size_t i, const double *drawn, readout_state *s)
 {
-    const size_t place = (size_t)s->n_read[i] % s->n_averaged;
+    const size_t index = (size_t)s->n_read[i] % s->n_averaged;
     s->n_read[i] += s->n_read[i] < INT32_MAX;
     const size_t n_known =
         (size_t)s->n_read[i] < s->n_averaged ? (size_t)s->n_read[i] : s->n_averaged;
     for (size_t axis = 0; axis < 3; ++axis) {
         double *const kept = &s->readings[3 * i + axis];
         const size_t apart = 3 * s->n_taxels;
-        kept[place * apart] =
+        kept[index * apart] =
             reading(c, s->passed[i], i, axis, s->numbers[WARMTH], drawn[3 * i + axis]);
         double sum = 0.0;
         for (size_t k = 0; k < n_known; ++k) {

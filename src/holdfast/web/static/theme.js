@@ -25,7 +25,7 @@ export function onTheme(changed) {
   lightTheme.addEventListener("change", () => { read(); changed(); });
 }
 
-export const fingerColour = (place) => colours[`finger-${place % 6}`];
+export const fingerColour = (index) => colours[`finger-${index % 6}`];
 export const stateColour = (key) => colours[key];
 export const stateLineColour = (key) => colours[`${key}-line`];
 

@@ -189,9 +189,9 @@ def mutated(packet, dice):
             case 4:
                 given[a : a + dice.randrange(12)] = dice.choice(TOKENS)
             case _:
-                place = given.find(b":", a) + 1
-                end = min(given.find(mark, place) % (len(given) + 1) for mark in (b",", b"}"))
-                given[place:end] = dice.choice(TOKENS)
+                start = given.find(b":", a) + 1
+                end = min(given.find(mark, start) % (len(given) + 1) for mark in (b",", b"}"))
+                given[start:end] = dice.choice(TOKENS)
     return bytes(given)
 
 

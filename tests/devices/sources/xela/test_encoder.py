@@ -30,8 +30,8 @@ def newtons(name="uskin-4x4"):
 
 def samples_of(sensors, k=0):
     return {
-        name: counts(one.n_taxels, 100 * k + place)
-        for place, (name, one) in enumerate(sensors.items())
+        name: counts(one.n_taxels, 100 * k + index)
+        for index, (name, one) in enumerate(sensors.items())
     }
 
 

@@ -28,13 +28,13 @@ def made_up(names=FINGERS, layout="uskin-curved", rate=150.0):
     times = np.arange(n) / rate
     layout = sensor(layout)
     tracks = {}
-    for place, name in enumerate(names):
-        rng = np.random.default_rng(place)
+    for index, name in enumerate(names):
+        rng = np.random.default_rng(index)
         press = np.clip((times - 2) / 0.8, 0, 1) * (1 - np.clip((times - 11) / 0.3, 0, 1))
-        shake = sum(np.exp(-(((times - t) / 0.25) ** 2)) for t in (5 + 0.05 * place, 8.5))
+        shake = sum(np.exp(-(((times - t) / 0.25) ** 2)) for t in (5 + 0.05 * index, 8.5))
         state = np.where(press <= 0, 1, np.where((press < 1) | (shake > 0.3), 2, 3))
         state[times < 0.6] = 0
-        centre = layout.positions[place % layout.n_taxels]
+        centre = layout.positions[index % layout.n_taxels]
         near = np.exp(-np.sum((layout.positions - centre) ** 2, axis=1) / 1e-4)
         load = 900 * (press + 0.2 * shake * np.sin(60 * times))[:, None, None] * [0.3, 0.2, 1.0]
         taxels = load * near[:, None] + rng.normal(0, 1, (n, len(near), 3))

@@ -19,7 +19,7 @@ def laid_out(page, layout):
 def test_a_flat_patch_does_not_change(module, name):
     layout = sensor(name)
     found = laid_out(module, layout)
-    assert found["places"] == pytest.approx(layout.positions[:, :2])
+    assert found["points"] == pytest.approx(layout.positions[:, :2])
     assert found["right"] == pytest.approx(np.tile([1.0, 0, 0], (layout.n_taxels, 1)))
     assert found["up"] == pytest.approx(np.tile([0, 1.0, 0], (layout.n_taxels, 1)))
 
@@ -27,15 +27,15 @@ def test_a_flat_patch_does_not_change(module, name):
 def test_the_curved_fingertip_shows_all_its_taxels(module):
     layout = sensor("uskin-curved")
     found = laid_out(module, layout)
-    places = found["places"]
-    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    points = found["points"]
+    apart = np.linalg.norm(points[:, None] - points[None], axis=2)
     assert apart[~np.eye(30, dtype=bool)].min() > 5e-3
     # Left is the mirror of right: the table lists the right side first, in the same order.
     for left, right in ((16, 10), (17, 11), (21, 15), (22, 6), (25, 9), (26, 1), (30, 5)):
-        assert places[left - 1] == pytest.approx(places[right - 1] * [-1, 1], abs=1e-9)
+        assert points[left - 1] == pytest.approx(points[right - 1] * [-1, 1], abs=1e-9)
     # The tip is up, and the lateral axis to the right.
-    assert places[9, 1] > places[14, 1]
-    assert places[0, 0] > 0
+    assert points[9, 1] > points[14, 1]
+    assert points[0, 0] > 0
 
 
 def test_a_push_to_the_tip_points_up_on_every_taxel_of_the_wall(module):

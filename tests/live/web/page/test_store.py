@@ -10,11 +10,11 @@ STORE = """async ([capacity, chunks, bins, window]) => {
   const before = size();
   let k = 0;
   for (const n of chunks) {
-    const places = Array.from({ length: n }, () => k++);
-    const own = { force: [places, places, places],
-                  instability: places.map((p) => p % 1000 === 77 ? 2 ** 33 : p),
-                  stable_probability: places.map(() => null), state: places.map((p) => p % 4) };
-    store.append({ times: places.map((p) => p / 100), fingers: { a: own } }, 3, 0.05);
+    const indices = Array.from({ length: n }, () => k++);
+    const own = { force: [indices, indices, indices],
+                  instability: indices.map((p) => p % 1000 === 77 ? 2 ** 33 : p),
+                  stable_probability: indices.map(() => null), state: indices.map((p) => p % 4) };
+    store.append({ times: indices.map((p) => p / 100), fingers: { a: own } }, 3, 0.05);
   }
   const a = store.fingers.get("a"), kept = (array) => [...array.subarray(store.start, store.end)];
   const { x, columns } = downsample(store, window, bins, [a.fx, a.sigma, a.probability]);

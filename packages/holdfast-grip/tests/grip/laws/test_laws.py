@@ -40,13 +40,13 @@ def started(name, touches, thumb=-1):
     return law
 
 
-class Wanted(NamedTuple):
+class Target(NamedTuple):
     scale: float
     reason: GripReason
 
 
-def wanted(law, touches, time, dt):
-    return [Wanted(*wish) for wish in law.wishes(touches, time, dt)]
+def update(law, touches, time, dt):
+    return [Target(*target) for target in law.targets(touches, time, dt)]
 
 
 @pytest.mark.parametrize("name", sorted(LAWS))
@@ -56,8 +56,8 @@ def test_a_quiet_grip_wants_no_rise(name):
         touches[0].scale = 2.0  # its margin for a friction of 0.3 is more than this grip has
     law = started(name, touches)
     for k in range(300):
-        (wish,) = wanted(law, touches, k * DT, DT)
-        assert wish.scale <= touches[0].scale
+        (target,) = update(law, touches, k * DT, DT)
+        assert target.scale <= touches[0].scale
 
 
 def shake(touches):
@@ -89,7 +89,7 @@ class TestRelaxation:
         law.start(touches, -1)
         before = [(one.force, one.tangential) for one in touches]
         slip(touches)
-        assert any(wish.scale > scale for wish in wanted(law, touches, 0.0, DT))
+        assert any(target.scale > scale for target in update(law, touches, 0.0, DT))
         for one, (force, tangential) in zip(touches, before, strict=True):
             one.force, one.tangential = force, tangential
             one.slides, one.slip_probability = False, 0.0
@@ -97,9 +97,9 @@ class TestRelaxation:
 
     def calm(self, law, touches, seconds, start=0.0):
         for k in range(1, round(seconds / DT) + 1):
-            wishes = wanted(law, touches, start + k * DT, DT)
-            for one, wish in zip(touches, wishes, strict=True):
-                one.scale = min(wish.scale, one.scale)
+            targets = update(law, touches, start + k * DT, DT)
+            for one, target in zip(touches, targets, strict=True):
+                one.scale = min(target.scale, one.scale)
         return [one.scale for one in touches]
 
     @pytest.mark.parametrize(("law", "slip"), RELAXING)
@@ -133,18 +133,18 @@ class TestRelaxation:
 class TestPr2:
     def shaken(self, amplitude, slow=0.0):
         touches = [touch(), touch(name="thumb")]
-        law, wishes = Pr2(gain=1.3, threshold_factor=1.0), []
+        law, targets = Pr2(gain=1.3, threshold_factor=1.0), []
         law.start(touches, -1)
         for k in range(60):
             normal = 2.0 + slow * k * DT
             touches[0].force = (normal, 0.6 + amplitude * (-1) ** k, 0.0)
             touches[0].normal = normal
-            wishes.append(wanted(law, touches, k * DT, DT))
-        return wishes
+            targets.append(update(law, touches, k * DT, DT))
+        return targets
 
     def test_a_vibration_above_the_threshold_raises_all_fingers(self):
         assert self.shaken(0.1)[-1] == [(1.3, GripReason.SLIP)] * 2
-        assert all(one.scale == 1.0 for wishes in self.shaken(0.01) for one in wishes)
+        assert all(one.scale == 1.0 for targets in self.shaken(0.01) for one in targets)
 
     def test_the_factor_raises_the_threshold(self):
         def rises(factor):
@@ -152,7 +152,7 @@ class TestPr2:
             law = Pr2(threshold_factor=factor)
             law.start(touches, -1)
             touches[0].force = (2.0, 0.7, 0.0)
-            return wanted(law, touches, DT, DT)[0].scale > 1.0
+            return update(law, touches, DT, DT)[0].scale > 1.0
 
         assert rises(1.0) and not rises(3.0)
 
@@ -171,40 +171,40 @@ class TestWongZhu:
         law.start(touches, -1)
         touches[0].tangential = tangential
         reasons = [GripReason.SLIP if scale > 1.0 else GripReason.NONE for scale in rise]
-        assert wanted(law, touches, DT, DT) == list(zip(rise, reasons, strict=True))
+        assert update(law, touches, DT, DT) == list(zip(rise, reasons, strict=True))
 
 
 class TestFrictionMargin:
     def test_the_target_is_the_margin_times_the_least_force(self):
         touches = [touch(normal=2.0, tangential=1.2)]
-        (wish,) = wanted(started("friction-margin", touches), touches, DT, DT)
-        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 holds: it is known
-        assert wish.reason is GripReason.MARGIN
+        (target,) = update(started("friction-margin", touches), touches, DT, DT)
+        assert target.scale == pytest.approx(FORCE_MARGIN * 1.2 / 0.6 / 2.0)  # 0.6 is known to hold
+        assert target.reason is GripReason.MARGIN
 
     def test_a_slip_lowers_the_friction(self):
         touches = [touch(normal=2.0, tangential=1.4)]
         law = started("friction-margin", touches)
-        wanted(law, touches, DT, DT)
+        update(law, touches, DT, DT)
         touches[0].probability, touches[0].tangential = 0.1, 1.2
-        (wish,) = wanted(law, touches, 2 * DT, DT)
-        assert wish.scale == pytest.approx(FORCE_MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
+        (target,) = update(law, touches, 2 * DT, DT)
+        assert target.scale == pytest.approx(FORCE_MARGIN * 1.2 / (0.9 * 0.6) / 2.0)
 
-    def wish(self, law, tangential):
+    def target(self, law, tangential):
         touches = [touch(tangential=tangential)]
         law.start(touches, -1)
-        return wanted(law, touches, DT, DT)[0]
+        return update(law, touches, DT, DT)[0]
 
     def test_it_falls_by_5_percent_at_most(self):
-        assert self.wish(FrictionMargin(fall=100.0), 0.01) == (0.95, GripReason.RELAX)
-        assert self.wish(FrictionMargin(fall=0.2), 0.01).scale == pytest.approx(1 - 0.2 * DT)
+        assert self.target(FrictionMargin(fall=100.0), 0.01) == (0.95, GripReason.RELAX)
+        assert self.target(FrictionMargin(fall=0.2), 0.01).scale == pytest.approx(1 - 0.2 * DT)
 
     def test_it_acts_below_a_margin_of_its_own(self):
         """The friction is 0.5: 2 N are 1.12 times what 0.893 N need."""
         always = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.15)
-        assert self.wish(always, 0.893).reason is GripReason.MARGIN
+        assert self.target(always, 0.893).reason is GripReason.MARGIN
         later = FrictionMargin(first_friction=0.5, margin=1.15, acts_at=1.1)
-        assert self.wish(later, 0.893) == (1.0, GripReason.NONE)
-        assert self.wish(later, 0.95).scale == pytest.approx(1.15 * 0.95 / 0.5 / 2.0)
+        assert self.target(later, 0.893) == (1.0, GripReason.NONE)
+        assert self.target(later, 0.95).scale == pytest.approx(1.15 * 0.95 / 0.5 / 2.0)
 
 
 FIRST = {"first_friction": 0.5, "least_friction": 0.25, "gain": 0.1, "slip_level": 0.1}
@@ -218,12 +218,12 @@ class TestCostanzo:
         return law, touches
 
     def scales(self, law, touches, n):
-        return [wanted(law, touches, k * DT, DT)[0].scale for k in range(n)]
+        return [update(law, touches, k * DT, DT)[0].scale for k in range(n)]
 
     def test_a_slip_of_one_finger_raises_all(self):
         law, touches = self.begun()
         slide(touches[:1])
-        first, second = wanted(law, touches, 0.0, DT)
+        first, second = update(law, touches, 0.0, DT)
         assert first == second and first.scale > 1.0 and first.reason is GripReason.SLIP
 
     def test_a_more_probable_slip_presses_more(self):
@@ -255,13 +255,13 @@ class TestCostanzo:
             one.tangential = 1.2
         scale = self.scales(law, touches, 60)[-1]
         assert scale == pytest.approx(STATIC_MARGIN * 2.4 / 0.5 / 4.0, rel=0.01)
-        assert wanted(law, touches, 1.0, DT)[0].reason is GripReason.MARGIN
+        assert update(law, touches, 1.0, DT)[0].reason is GripReason.MARGIN
 
     def test_a_slip_shows_the_friction(self):
         """T/N is 0.3: as the load doubles, the force follows for 0.3 and no more for 0.5."""
         law, touches = self.begun(gain=0.0)
         slide(touches)
-        wanted(law, touches, 0.0, DT)
+        update(law, touches, 0.0, DT)
         for one in touches:
             one.slip_probability, one.tangential = 0.0, 1.2
         assert self.scales(law, touches, 60)[-1] == pytest.approx(
@@ -272,18 +272,18 @@ class TestCostanzo:
         law, touches = self.begun()
         slide(touches)
         touches[1].known = False
-        assert wanted(law, touches, 0.0, DT) == [(1.0, GripReason.NONE)] * 2
+        assert update(law, touches, 0.0, DT) == [(1.0, GripReason.NONE)] * 2
 
 
 class TestStability:
     def scale_after(self, law, touches, seconds, start=0.0):
-        """Return the scale after a time in which the hand follows each wish at once."""
+        """Return the scale after a time in which the hand follows each target at once."""
         for k in range(1, round(seconds / DT) + 1):
-            (wish, *others) = wanted(law, touches, start + k * DT, DT)
-            assert all(other == wish for other in others), "one scale for the hand"
+            (target, *others) = update(law, touches, start + k * DT, DT)
+            assert all(other == target for other in others), "one scale for the hand"
             for one in touches:
-                one.normal *= wish.scale / one.scale
-                one.scale = wish.scale
+                one.normal *= target.scale / one.scale
+                one.scale = target.scale
         return touches[0].scale
 
     def test_a_load_that_grows_is_followed_before_anything_slips(self):
@@ -293,11 +293,11 @@ class TestStability:
         one.probability = 0.83
         for k in range(1, 20):
             one.tangential = 0.6 + 0.03 * min(k, 10)
-            (wish,) = wanted(law, [one], 0.5 + k * DT, DT)
-            if wish.scale > 1.0:
+            (target,) = update(law, [one], 0.5 + k * DT, DT)
+            if target.scale > 1.0:
                 break
-        assert wish.scale > 1.2
-        assert wish.reason is GripReason.LOAD
+        assert target.scale > 1.2
+        assert target.reason is GripReason.LOAD
 
     def test_a_load_that_someone_else_carries_at_first_is_no_reaction(self):
         """The calm grip is followed while the object is handed over."""
@@ -305,15 +305,15 @@ class TestStability:
         law = started("holdfast", [one])
         for k in range(300):
             one.tangential = min(0.05 + 0.01 * k, 0.6)
-            (wish,) = wanted(law, [one], k * DT, DT)
-            assert wish.scale == 1.0
+            (target,) = update(law, [one], k * DT, DT)
+            assert target.scale == 1.0
 
     def step(self, probability, scale=1.0, slip=None):
         """Return the rise at the second sample; `slip` is the probability of a slide."""
         one = touch(probability=probability)
         law = started("holdfast", [one])
         one.scale, one.slides, one.slip_probability = scale, slip is not None, slip or 0.0
-        return [wanted(law, [one], k * DT, DT)[0].scale for k in range(2)][-1] - scale
+        return [update(law, [one], k * DT, DT)[0].scale for k in range(2)][-1] - scale
 
     def test_the_step_grows_with_the_doubt_and_with_the_probability_of_a_slip(self):
         assert 0.0 < self.step(0.1) < self.step(0.05) < self.step(0.0)
@@ -325,19 +325,19 @@ class TestStability:
     def test_no_second_step_in_the_refractory_time(self):
         one = touch(probability=0.0)
         law = started("holdfast", [one])
-        (first,) = wanted(law, [one], 0.0, DT)
+        (first,) = update(law, [one], 0.0, DT)
         one.scale = first.scale
         times = [k * DT for k in range(1, 60)]
-        second = next(time for time in times if wanted(law, [one], time, DT)[0].scale > one.scale)
+        second = next(time for time in times if update(law, [one], time, DT)[0].scale > one.scale)
         assert second > law.refractory
 
     def test_after_a_step_a_doubt_as_it_leaves_starts_no_second_one(self):
         one = touch(probability=0.0)
         law = started("holdfast", [one])
-        (first,) = wanted(law, [one], 0.0, DT)
+        (first,) = update(law, [one], 0.0, DT)
         one.scale, one.probability = first.scale, 0.2
         times = [k * DT for k in range(1, round(law.episode / DT))]
-        assert {wanted(law, [one], time, DT)[0].scale for time in times} == {first.scale}
+        assert {update(law, [one], time, DT)[0].scale for time in times} == {first.scale}
 
     @pytest.mark.parametrize(("fingers", "slowest"), [(1, 0.1), (4, 0.02)])
     def test_a_reaction_comes_the_sooner_the_more_of_the_load_slides(self, fingers, slowest):
@@ -345,7 +345,7 @@ class TestStability:
         law = started("holdfast", touches)
         for one in touches[:fingers]:
             one.probability = 0.4
-        scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
+        scales = [update(law, touches, k * DT, DT)[0].scale for k in range(30)]
         first = next(k for k, scale in enumerate(scales) if scale > 1.0)
         assert slowest / 4 < first * DT + DT <= slowest
 
@@ -353,11 +353,11 @@ class TestStability:
         one = touch(probability=0.95)
         one.slides, one.slip_probability = True, 0.2
         law = started("holdfast", [one])
-        wish = [wanted(law, [one], k * DT, DT)[0] for k in range(2)][-1]
-        assert wish.scale > 1.0 and wish.reason is GripReason.UNSTABLE
+        target = [update(law, [one], k * DT, DT)[0] for k in range(2)][-1]
+        assert target.scale > 1.0 and target.reason is GripReason.UNSTABLE
         one.slides = False
         law = started("holdfast", [one])
-        assert wanted(law, [one], 0.0, DT)[0].scale == 1.0
+        assert update(law, [one], 0.0, DT)[0].scale == 1.0
 
     def test_a_hand_that_carries_less_reacts_sooner_and_more(self):
         """Where friction falls, all contacts slide smoothly, and no finger is surely unstable."""
@@ -367,7 +367,7 @@ class TestStability:
             law = started("holdfast", touches)
             for one in touches:
                 one.tangential, one.probability = tangential, 0.8
-            scales = [wanted(law, touches, k * DT, DT)[0].scale for k in range(30)]
+            scales = [update(law, touches, k * DT, DT)[0].scale for k in range(30)]
             first = next(k for k, scale in enumerate(scales) if scale > 1.0)
             return first, scales[first]
 
@@ -382,7 +382,7 @@ class TestStability:
         self.scale_after(law, [one], 1.1)
         assert 1.0 < one.scale < 1.5, "the force falls"
         one.probability, one.tangential, one.normal = 0.7, 0.7 * one.tangential, press * one.normal
-        scales = [wanted(law, [one], 1.1 + k * DT, DT)[0].scale for k in range(1, 16)]
+        scales = [update(law, [one], 1.1 + k * DT, DT)[0].scale for k in range(1, 16)]
         assert (max(scales) > one.scale) is rises
 
     def test_after_a_slip_the_floor_follows_the_load(self):
@@ -390,7 +390,7 @@ class TestStability:
         one = touch(normal=2.0, tangential=1.0, probability=0.0)
         one.slides, one.slip_probability = True, 0.9
         law = started("holdfast", [one])
-        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.scale = update(law, [one], 0.0, DT)[0].scale
         one.slides, one.slip_probability, one.probability = False, 0.0, 0.95
         one.normal = 2.0 * one.scale
         assert self.scale_after(law, [one], 4.0) == pytest.approx(law.margin, rel=0.2)
@@ -400,7 +400,7 @@ class TestStability:
     def test_a_floor_without_a_slip_rule_is_the_force_of_the_slip_and_the_margin(self):
         one = touch(probability=0.0)
         law = started("holdfast", [one])
-        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.scale = update(law, [one], 0.0, DT)[0].scale
         one.probability = 0.95
         assert 1.0 < self.scale_after(law, [one], 4.0) <= law.margin
 
@@ -410,14 +410,14 @@ class TestStability:
         law = started("holdfast", [one])
         self.scale_after(law, [one], 0.5)
         one.scale, one.normal, one.probability = 2.4, 4.8, 0.0
-        one.scale = wanted(law, [one], 0.51, DT)[0].scale
+        one.scale = update(law, [one], 0.51, DT)[0].scale
         one.probability = 0.95
         assert self.scale_after(law, [one], 6.0, 0.51) < 1.5
 
     def test_a_doubt_that_a_step_leaves_starts_no_other_one_after_the_episode(self):
         one = touch(probability=0.0)
         law = started("holdfast", [one])
-        one.scale = wanted(law, [one], 0.0, DT)[0].scale
+        one.scale = update(law, [one], 0.0, DT)[0].scale
         one.probability = 0.8
         self.scale_after(law, [one], 2.0)
         assert one.scale < 2.5
@@ -455,5 +455,5 @@ class TestStability:
     def test_a_finger_without_contact_is_pressed(self):
         one = touch()
         one.touching = False
-        (wish,) = wanted(started("holdfast", [one]), [one], DT, DT)
-        assert wish.reason is GripReason.UNSTABLE
+        (target,) = update(started("holdfast", [one]), [one], DT, DT)
+        assert target.reason is GripReason.UNSTABLE

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from grip.laws.test_laws import DT, started, touch, wanted
+from grip.laws.test_laws import DT, started, touch, update
 from holdfast_grip import GripReason
 from holdfast_grip.laws.response import ResponseTimer
 from holdfast_grip.laws.stability import PROBE_RISE, RESERVE
@@ -15,18 +15,18 @@ def knowing(**fields):
 
 
 def held(delay, seconds=0.6, law=None, one=None, gain=1.0, start=0.0):
-    """A law whose hand responds after a delay; its wishes."""
+    """A law whose hand responds after a delay; its targets."""
     one = one or knowing()
     law = law or started("holdfast", [one])
-    wishes, commands = [], []
+    targets, commands = [], []
     for k in range(1, round(seconds / DT) + 1):
-        (wish,) = wanted(law, [one], start + k * DT, DT)
-        wishes.append(wish)
-        commands.append(wish.scale)
-        one.scale = wish.scale
+        (target,) = update(law, [one], start + k * DT, DT)
+        targets.append(target)
+        commands.append(target.scale)
+        one.scale = target.scale
         late = k - 1 - round(delay / DT)
         one.normal = 2.0 * (1.0 + gain * ((commands[late] if late >= 0 else 1.0) - 1.0))
-    return law, one, wishes
+    return law, one, targets
 
 
 class TestTimer:
@@ -47,29 +47,29 @@ class TestTimer:
 class TestLaw:
     @pytest.mark.parametrize("delay", [2 * DT, 6 * DT, 10 * DT])
     def test_a_small_rise_at_the_start_measures_the_hand(self, delay):
-        law, _, wishes = held(delay)
+        law, _, targets = held(delay)
         assert law.response == pytest.approx(delay, abs=2.5 * DT)
         assert not law.notice
-        assert max(wish.scale for wish in wishes[:35]) == 1.0 + PROBE_RISE
-        assert {wish.reason for wish in wishes} <= {
+        assert max(target.scale for target in targets[:35]) == 1.0 + PROBE_RISE
+        assert {target.reason for target in targets} <= {
             GripReason.MARGIN, GripReason.RELAX, GripReason.NONE,
         }  # fmt: skip
 
     def test_a_slow_hand_keeps_a_reserve(self):
-        law, _, wishes = held(9 * DT, seconds=2.0)
-        assert wishes[-1].scale == pytest.approx(1.0 + RESERVE * law.response)
+        law, _, targets = held(9 * DT, seconds=2.0)
+        assert targets[-1].scale == pytest.approx(1.0 + RESERVE * law.response)
 
     def test_a_hand_that_does_not_follow_is_told_once(self):
-        law, _, wishes = held(0.0, gain=0.0)
+        law, _, targets = held(0.0, gain=0.0)
         assert "did not follow" in law.notice
         assert law.response == 0.0
-        assert wishes[-1].scale <= 1.0 + PROBE_RISE
+        assert targets[-1].scale <= 1.0 + PROBE_RISE
 
     def test_a_slide_at_the_start_is_told(self):
         one = knowing()
         law = started("holdfast", [one])
         one.slides, one.slip_probability = True, 0.9
-        wanted(law, [one], DT, DT)
+        update(law, [one], DT, DT)
         assert "something slid" in law.notice
 
     def test_a_response_that_changes_twice_is_told(self):
@@ -79,8 +79,8 @@ class TestLaw:
         assert "to 110 ms" in law.notice
 
     def test_a_model_without_a_slip_rule_gives_no_rise(self):
-        law, _, wishes = held(5 * DT, one=touch())
-        assert {wish.scale for wish in wishes} == {1.0} and law.response == 0.0
+        law, _, targets = held(5 * DT, one=touch())
+        assert {target.scale for target in targets} == {1.0} and law.response == 0.0
 
 
 class TestTwoSpeeds:
@@ -92,30 +92,30 @@ class TestTwoSpeeds:
     def test_instability_with_load_gives_a_small_rise_first(self):
         law, one = self.calm()
         before = one.scale
-        one.probability, wishes = 0.85, []
+        one.probability, targets = 0.85, []
         for k in range(1, 6):
             one.tangential += 0.04
-            wishes += wanted(law, [one], 2.0 + k * DT, DT)
-            one.scale = max(one.scale, wishes[-1].scale)
-        assert {wish.reason for wish in wishes} == {GripReason.LOAD, GripReason.RELAX}
+            targets += update(law, [one], 2.0 + k * DT, DT)
+            one.scale = max(one.scale, targets[-1].scale)
+        assert {target.reason for target in targets} == {GripReason.LOAD, GripReason.RELAX}
         assert before < one.scale < before + 0.4
 
     def test_a_slip_gives_a_kick(self):
         law, one = self.calm()
         before = one.scale
         one.slides, one.slip_probability = True, 1.0
-        (wish,) = [wanted(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 4)][-1:]
-        assert wish.reason is GripReason.UNSTABLE and wish.scale > before + 0.8
+        (target,) = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 4)][-1:]
+        assert target.reason is GripReason.UNSTABLE and target.scale > before + 0.8
 
-    def test_a_grip_that_was_never_stable_is_judged_by_what_it_adds(self):
+    def test_a_grip_that_was_never_stable_is_evaluated_by_what_it_adds(self):
         law, one = self.calm(probability=0.1)
-        wishes = [wanted(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 90)]
-        assert max(wish.scale for wish in wishes) <= one.scale
+        targets = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 90)]
+        assert max(target.scale for target in targets) <= one.scale
 
     def test_a_hand_that_presses_more_and_carries_its_load_holds(self):
         law, one = self.calm()
         one.normal *= 1.3
-        wanted(law, [one], 2.0 + DT, DT)
+        update(law, [one], 2.0 + DT, DT)
         one.probability = 0.0
-        wishes = [wanted(law, [one], 2.0 + k * DT, DT)[0] for k in range(2, 20)]
-        assert max(wish.scale for wish in wishes) <= one.scale
+        targets = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(2, 20)]
+        assert max(target.scale for target in targets) <= one.scale

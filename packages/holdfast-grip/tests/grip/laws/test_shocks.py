@@ -2,7 +2,7 @@
 
 import pytest
 
-from grip.laws.test_laws import DT, started, touch, wanted
+from grip.laws.test_laws import DT, started, touch, update
 from grip.laws.test_response import knowing
 from holdfast_grip.laws.stability import BLOW_TIME, LONGEST_SHOCK, SHOCK_TIME, UNCONFIRMED
 
@@ -37,11 +37,11 @@ def first_rise(
         one.probability = 0.02 if doubts else 0.95
         one.slides = doubts and slides_after is not None and since >= slides_after
         one.slip_probability = 0.9 if one.slides else 0.0
-        (wish,) = wanted(law, [one], k * dt, dt)
-        if since >= 0 and wish.scale > max(one.scale, 1.07):
+        (target,) = update(law, [one], k * dt, dt)
+        if since >= 0 and target.scale > max(one.scale, 1.07):
             return since
-        if wish.scale < one.scale or since < 0:
-            one.scale = wish.scale
+        if target.scale < one.scale or since < 0:
+            one.scale = target.scale
     return None
 
 
@@ -90,7 +90,7 @@ def test_noise_of_a_light_grip_is_no_blow():
         one.normal = 0.2 + 0.01 * (-1) ** k
         if k * DT >= BEGIN:
             one.probability = 0.02
-            rises.append(wanted(law, [one], k * DT, DT)[0].scale > 1.07)
+            rises.append(update(law, [one], k * DT, DT)[0].scale > 1.07)
         else:
-            wanted(law, [one], k * DT, DT)
+            update(law, [one], k * DT, DT)
     assert any(rises)

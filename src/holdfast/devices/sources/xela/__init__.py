@@ -21,13 +21,13 @@ def source(address: Address) -> Source:
     Raises:
         ValueError: the address or a parameter is not valid.
     """
+    from holdfast.devices.sources.xela.addresses import server_addresses
     from holdfast.devices.sources.xela.client import XelaSource
-    from holdfast.devices.sources.xela.places import places
 
     address.only("values", "fingers", "sensor")
     return XelaSource(
         address.text,
-        places(address),
+        server_addresses(address),
         address.names(),
         calibrated=address.calibrated(),
         sensor=address.sensor(),
@@ -36,9 +36,9 @@ def source(address: Address) -> Source:
 
 def state() -> str:
     """Return whether a server listens at this machine's own addresses."""
-    from holdfast.devices.sources.xela.places import places
+    from holdfast.devices.sources.xela.addresses import server_addresses
 
-    addresses = places(parse("xela://auto")[1])
+    addresses = server_addresses(parse("xela://auto")[1])
     for address in addresses:
         with suppress(OSError), socket.create_connection(address, PROBE_TIMEOUT):
             return f"a server listens at {address}"

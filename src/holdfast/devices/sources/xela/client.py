@@ -15,9 +15,9 @@ from websockets.exceptions import (
 from websockets.sync.client import ClientConnection, connect
 
 from holdfast.devices.sources.base import DeviceSource
+from holdfast.devices.sources.xela.addresses import ServerAddress
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.packet import InvalidPacket
-from holdfast.devices.sources.xela.places import Place
 from holdfast.errors import SourceError
 from holdfast.sensors import Sensor
 
@@ -48,7 +48,7 @@ class XelaSource(DeviceSource):
 
     Args:
         name: URI of the source.
-        places: network addresses to try, in order.
+        addresses: network addresses to try, in order.
         names: names of the sensors by the server's number.
         calibrated: take readings in newtons.
         sensor: layout of the separate sensors with this number of taxels.
@@ -59,7 +59,7 @@ class XelaSource(DeviceSource):
     def __init__(
         self,
         name: str,
-        places: tuple[Place, ...],
+        addresses: tuple[ServerAddress, ...],
         names: Mapping[int, str] | None = None,
         *,
         calibrated: bool = False,
@@ -67,8 +67,8 @@ class XelaSource(DeviceSource):
     ) -> None:
         super().__init__()
         self.name = name
-        self._places = places
-        self._place = places[0]  # the one with the server, for messages
+        self._addresses = addresses
+        self._address = addresses[0]  # the one with the server, for messages
         self._options = (names, calibrated, sensor)
         self._decoder = self._new_decoder()
         self._connection: ClientConnection | None = None
@@ -97,12 +97,12 @@ class XelaSource(DeviceSource):
             except TimeoutError:
                 break
             except ConnectionClosed as why:
-                raise SourceError(f"{self._place} closed the connection: {why}") from why
+                raise SourceError(f"{self._address} closed the connection: {why}") from why
         if not text and invalid is not None:
-            raise SourceError(f"{self._place} sends invalid packets: {invalid}") from invalid
+            raise SourceError(f"{self._address} sends invalid packets: {invalid}") from invalid
         if not text:
             raise SourceError(
-                f"connected to {self._place}, but no samples came in {XELA_OPEN_TIMEOUT:g} s: is "
+                f"connected to {self._address}, but no samples came in {XELA_OPEN_TIMEOUT:g} s: is "
                 "it a XELA server, with its sensors plugged in?"
             )
         self.sensors = self._decoder.sensors
@@ -119,21 +119,21 @@ class XelaSource(DeviceSource):
         return XelaDecoder(names, calibrated=calibrated, sensor=sensor)
 
     def _connected(self) -> ClientConnection:
-        """Connect to the first place with a server."""
+        """Connect to the first address with a server."""
         failures: list[Exception] = []
-        for place in self._places:
+        for address in self._addresses:
             try:
-                connection = _connect(place)
+                connection = _connect(address)
             except (OSError, WebSocketException) as failure:
                 failures.append(failure)
             else:
-                self._place = place
+                self._address = address
                 return connection
-        where = " or ".join(map(str, self._places))
+        where = " or ".join(map(str, self._addresses))
         # The most helpful first: no server at all, another server, anything else.
         if all(isinstance(failure, ConnectionRefusedError) for failure in failures):
             why = (
-                f"no server listens at {where}{TRY_AUTO if len(self._places) == 1 else ''}; "
+                f"no server listens at {where}{TRY_AUTO if len(self._addresses) == 1 else ''}; "
                 "without a hand, use `holdfast play`"
             )
         elif any(isinstance(failure, WebSocketException) for failure in failures):
@@ -181,15 +181,15 @@ class XelaSource(DeviceSource):
             keepalive.join(XELA_CONNECT_TIMEOUT)
 
 
-def _connect(place: Place) -> ClientConnection:
+def _connect(server: ServerAddress) -> ClientConnection:
     """Connect to a server. A redirect to another server is refused."""
     deadline = time.monotonic() + XELA_CONNECT_TIMEOUT
-    address = socket.create_connection((place.host, place.port), XELA_CONNECT_TIMEOUT)
-    address.settimeout(None)
+    connected = socket.create_connection((server.host, server.port), XELA_CONNECT_TIMEOUT)
+    connected.settimeout(None)
     try:
         return connect(
-            f"ws://{place}",
-            sock=address,  # websockets follows redirects only with sockets of its own
+            f"ws://{server}",
+            sock=connected,  # websockets follows redirects only with sockets of its own
             compression=None,
             proxy=None,
             open_timeout=max(deadline - time.monotonic(), MIN_HANDSHAKE_TIME),

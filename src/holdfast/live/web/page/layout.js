@@ -25,9 +25,9 @@ function radius(sines, cosines, across, depth) {
     return values.map((x) => x - mean);
   };
   const along = [...centred(sines), ...centred(cosines)];
-  const places = [...centred(across), ...centred(depth)];
+  const points = [...centred(across), ...centred(depth)];
   const spread = along.reduce((sum, x) => sum + x * x, 0);
-  const product = along.reduce((sum, x, k) => sum + x * places[k], 0);
+  const product = along.reduce((sum, x, k) => sum + x * points[k], 0);
   return spread > 1e-6 ? Math.max(0, product / spread) : 0;
 }
 
@@ -38,8 +38,8 @@ function radius(sines, cosines, across, depth) {
  * r (theta - sin theta), where r is the fitted radius; likewise over the tip. A flat patch does
  * not change.
  *
- * @returns {{places: number[][], right: number[][], up: number[][], spacing: number}}
- *   places [m] as (right, up); the directions in the fingertip frame that are right and up on
+ * @returns {{points: number[][], right: number[][], up: number[][], spacing: number}}
+ *   points [m] as (right, up); the directions in the fingertip frame that are right and up on
  *   the map at each taxel; the distance between neighbours [m].
  */
 export function layout(positions, rotations, normal) {
@@ -54,35 +54,35 @@ export function layout(positions, rotations, normal) {
   const pick = (values, axis) => values.map((v) => v[axis]);
   const around = radius(pick(n, 0), pick(n, 2), pick(p, 0), pick(p, 2));
   const over = radius(pick(n, 1), level, pick(p, 1), pick(p, 2));
-  const places = spreadOut(p.map(([across, up], k) => [
+  const points = spreadOut(p.map(([across, up], k) => [
     across + around * (theta[k] - Math.sin(theta[k])),
     up + over * (psi[k] - Math.sin(psi[k])),
   ]));
   const right = theta.map((t) => plus(scaled(view.right, Math.cos(t)), scaled(view.out, -Math.sin(t))));
   const up = right.map((v, k) => cross(normals[k], v));
-  return { places, right, up, spacing: spacing(places) };
+  return { points, right, up, spacing: spacing(points) };
 }
 
-/** Return the smallest distance between two places; 1 mm for a single taxel. */
-function spacing(places) {
+/** Return the smallest distance between two points; 1 mm for a single taxel. */
+function spacing(points) {
   let least = Infinity;
-  places.forEach((a, k) => {
-    for (const b of places.slice(k + 1)) {
+  points.forEach((a, k) => {
+    for (const b of points.slice(k + 1)) {
       least = Math.min(least, Math.hypot(a[0] - b[0], a[1] - b[1]));
     }
   });
   return Number.isFinite(least) ? least : 1e-3;
 }
 
-// Return a square grid for sensors without positions (all taxels in one place).
-function spreadOut(places) {
+// Return a square grid for sensors without positions (all taxels at one point).
+function spreadOut(points) {
   const extent = Math.max(...[0, 1].map((axis) => {
-    const values = places.map((place) => place[axis]);
+    const values = points.map((point) => point[axis]);
     return Math.max(...values) - Math.min(...values);
   }));
-  if (places.length < 2 || spacing(places) > 0.02 * extent) return places;
-  const side = Math.ceil(Math.sqrt(places.length));
-  return places.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
+  if (points.length < 2 || spacing(points) > 0.02 * extent) return points;
+  const side = Math.ceil(Math.sqrt(points.length));
+  return points.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
 }
 
 /** Rotate a reading from the taxel frame to (right, up, normal) of the map. */
@@ -91,9 +91,9 @@ export function toMapFrame(reading, rotation, right, up) {
   return [dot(tangent, right), dot(tangent, up), reading[2]];
 }
 
-/** Return the convex hull of the places, counter-clockwise: the outline of the sensor. */
-export function hull(places) {
-  const sorted = [...places].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+/** Return the convex hull of the points, counter-clockwise: the outline of the sensor. */
+export function hull(points) {
+  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
   const turn = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
   const half = (points) => {
     const chain = [];

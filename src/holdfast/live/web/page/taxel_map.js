@@ -64,7 +64,7 @@ export class TaxelMap {
     this.sensor = sensor;
     this.scales = scales;
     this.layout = layout(sensor.positions, sensor.rotations, sensor.normal);
-    this.hull = hull(this.layout.places);
+    this.hull = hull(this.layout.points);
     this.values = sensor.positions.map(() => [0, 0, 0]);
     this.faulty = new Set();
     this.known = false;
@@ -100,9 +100,9 @@ export class TaxelMap {
 
   // Return the map from metres to pixels that fits all discs and the outline.
   toPixels() {
-    const [width, height] = this.size, { places, spacing } = this.layout;
+    const [width, height] = this.size, { points, spacing } = this.layout;
     const ends = [0, 1].map((axis) => {
-      const values = places.map((place) => place[axis]);
+      const values = points.map((point) => point[axis]);
       return [Math.min(...values), Math.max(...values)];
     });
     const margin = 0.5 * ARROW * spacing, label = 14;
@@ -126,9 +126,9 @@ export class TaxelMap {
     const { zoom, at } = this.toPixels();
     const radius = 0.49 * zoom * this.layout.spacing;
     this.drawOutline(context, at, radius);
-    const places = this.layout.places.map(at);
-    places.forEach((place, k) => this.drawDisc(context, place, k, radius));
-    if (this.known) places.forEach((place, k) => this.drawArrow(context, place, k, radius));
+    const points = this.layout.points.map(at);
+    points.forEach((point, k) => this.drawDisc(context, point, k, radius));
+    if (this.known) points.forEach((point, k) => this.drawArrow(context, point, k, radius));
     this.drawLabel(context, width, height);
   }
 

@@ -13,7 +13,7 @@ _OUTSIDE_ADDRESS = ("192.0.2.1", 9)
 """Address reserved for documentation; nothing is sent to it."""
 
 
-class Place(NamedTuple):
+class ServerAddress(NamedTuple):
     """A host and a port."""
 
     host: str
@@ -23,8 +23,8 @@ class Place(NamedTuple):
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
 
 
-def places(address: Address) -> tuple[Place, ...]:
-    """Return the places to try, in order.
+def server_addresses(address: Address) -> tuple[ServerAddress, ...]:
+    """Return the addresses to try, in order.
 
     xela_server binds the address of the network card, even if it is configured otherwise.
     Therefore `auto` tries 127.0.0.1, then the address of the default route.
@@ -34,7 +34,7 @@ def places(address: Address) -> tuple[Place, ...]:
 
     Example:
         >>> from holdfast.devices.uri import parse
-        >>> [str(place) for place in places(parse("xela://hand.local")[1])]
+        >>> [str(address) for address in server_addresses(parse("xela://hand.local")[1])]
         ['hand.local:5000']
     """
     expected = f"{address.text}: xela://HOST:PORT or xela://{AUTO_HOST} expected"
@@ -46,9 +46,9 @@ def places(address: Address) -> tuple[Place, ...]:
     if address.path not in ("", "/") or "@" in address.host or not port:
         raise ValueError(expected)
     if host != AUTO_HOST:
-        return (Place(host, port),)
+        return (ServerAddress(host, port),)
     hosts = dict.fromkeys((HOST, own_address()))
-    return tuple(Place(one, port) for one in hosts if one)
+    return tuple(ServerAddress(one, port) for one in hosts if one)
 
 
 def own_address() -> str | None:

@@ -195,7 +195,7 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
         return
     names = choice["recordings"]
     origin = f"{len(names)} recordings ({_few(names)})" if names else "the training, out of fold"
-    # A slip is judged faster than a state, and by the time of one held finger.
+    # A slip is scored within a shorter time than a state, and per time of one held finger.
     is_stable = name == "stable"
     events, time, within = ("events", "stable", 0.2) if is_stable else ("slips", "held", 0.1)
     found = "" if choice["found"] is None else f"; {choice['found']:.0f} % found within {within} s"

@@ -202,7 +202,7 @@ def _episodes(
         found: dict[str, list[int]] = {}
         for row, value in enumerate(values):
             found.setdefault(_episode_name(value), []).append(row)
-        return {name: np.array(places) for name, places in found.items()}
+        return {name: np.array(indices) for name, indices in found.items()}
     if not len(back):
         return {"1": rows}
     if values:
@@ -353,11 +353,11 @@ def _labels(
     pairs: list[tuple[ContactState, Cause | None] | None] = []
     for row, words in enumerate(zip(states, causes, strict=True), table.first_line):
         state, cause = (word.strip() for word in words)
-        place = f"{table.path}, row {row}"
+        where = f"{table.path}, row {row}"
         if state and state.lower() not in known:
-            raise RecordingError(f"{place}: label {state!r} given; {', '.join(known)} are known")
+            raise RecordingError(f"{where}: label {state!r} given; {', '.join(known)} are known")
         if state and cause.lower() not in ("", *Cause):
-            raise RecordingError(f"{place}: cause {cause!r} given; {', '.join(Cause)} are known")
+            raise RecordingError(f"{where}: cause {cause!r} given; {', '.join(Cause)} are known")
         named = Cause(cause.lower()) if state and cause else None
         pairs.append((ContactState(state.upper()), named) if state else None)
     return labels_from_samples(module.times, pairs, period=module.period, evidence="csv")

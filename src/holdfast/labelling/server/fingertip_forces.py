@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording
+from holdfast.io.file_formats import SUFFIXES, format_module
 from holdfast.io.header import Header, header_sensors
-from holdfast.io.recording_files import SUFFIXES, format_module
 from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import TACTILE, TimedArray, TimedArrays, recording_from
 from holdfast.recordings import Recording

@@ -1,4 +1,4 @@
-"""Record a source to a file: where the file is, what it holds, and when the recording is over."""
+"""Set up the recording of a source: its file, its header, and when it is over."""
 
 import math
 import re

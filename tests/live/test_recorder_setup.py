@@ -5,7 +5,7 @@ import pytest
 from holdfast.devices.sources import open_source
 from holdfast.errors import OutputError, SourceError
 from holdfast.io import save_recording
-from holdfast.live.source_recording import (
+from holdfast.live.recorder_setup import (
     arrivals_for,
     create_recorder,
     recording,

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from holdfast.contact import Fault
 from holdfast.devices.sources import Arrival
 from holdfast.devices.sources.base import notice_arrival
-from holdfast.live import recording_buffer as module
-from holdfast.live.recording_buffer import ModuleBuffer, RecordingBuffer, marker_text
+from holdfast.live import arrival_buffer as module
+from holdfast.live.arrival_buffer import ArrivalBuffer, ModuleBuffer, marker_text
 from holdfast.recordings import Tactile
 from holdfast.sensors import sensor
 
@@ -71,7 +71,7 @@ def test_gaps_are_those_of_the_recording_for_any_chunks(missing, cuts):
 
 
 def test_faults_last_until_an_arrival_clears_them():
-    buffer = RecordingBuffer({"thumb": ANYSKIN, "index": ANYSKIN})
+    buffer = ArrivalBuffer({"thumb": ANYSKIN, "index": ANYSKIN})
     late, values, markers = {"thumb": (Fault.LATE,)}, np.zeros((5, 3)), []
     for k, (name, faults) in enumerate(
         [
@@ -93,7 +93,7 @@ def test_faults_last_until_an_arrival_clears_them():
 
 def test_a_device_with_endless_notices_fills_no_memory(monkeypatch):
     monkeypatch.setattr(module, "MAX_PENDING_MARKERS", 500)
-    buffer = RecordingBuffer({"thumb": ANYSKIN})
+    buffer = ArrivalBuffer({"thumb": ANYSKIN})
     for k in range(10_000):
         buffer.add(notice_arrival(0.01 * k, f"noise {k}", n_refused=1))
     assert buffer.n_refused == 10_000

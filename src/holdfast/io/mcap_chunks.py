@@ -62,7 +62,7 @@ def read_chunks(path: Path, complete: bool) -> Iterator[bytes]:
                     f"{path} is damaged: the record at byte {start - _RECORD.size} contradicts "
                     "its length"
                 )
-            # A record that ends after the file is the place of the cut.
+            # A record that ends after the file is where it was cut.
             if opcode == Opcode.DATA_END or end > size:
                 return
             if opcode == Opcode.CHUNK:
@@ -85,13 +85,13 @@ def records_in(data: bytes) -> Iterator[tuple[int, bytes]]:
     Raises:
         ValueError: a record is longer than the chunk.
     """
-    place = 0
-    while place < len(data):
-        opcode, length = _RECORD.unpack_from(data, place)
-        place += _RECORD.size + length
-        if place > len(data):
+    offset = 0
+    while offset < len(data):
+        opcode, length = _RECORD.unpack_from(data, offset)
+        offset += _RECORD.size + length
+        if offset > len(data):
             raise ValueError(f"a record of {length} bytes ends after its chunk")
-        yield opcode, data[place - length : place]
+        yield opcode, data[offset - length : offset]
 
 
 def has_end(path: Path) -> bool:
@@ -120,15 +120,15 @@ def check_checksums(path: Path) -> None:
     with path.open("rb") as file:
         opcode, length, start, _, summary_crc = _FOOTER.unpack(_tail(file))
         size = file.seek(0, 2)
-        place = size - len(MAGIC) - _FOOTER.size
-        valid = _is_footer(opcode, length) and _DATA_END.size + len(MAGIC) <= start <= place
+        offset = size - len(MAGIC) - _FOOTER.size
+        valid = _is_footer(opcode, length) and _DATA_END.size + len(MAGIC) <= start <= offset
         if valid:
             file.seek(0)
             data_crc = _crc(file, start - _DATA_END.size)
             ending = _DATA_END.unpack(file.read(_DATA_END.size))
             valid = (
                 ending == (Opcode.DATA_END, 4, data_crc)
-                and _crc(file, place + _FOOTER.size - 4 - start) == summary_crc
+                and _crc(file, offset + _FOOTER.size - 4 - start) == summary_crc
                 and file.read()[4:] == MAGIC  # after the checksum of the summary itself
             )
     if not valid:
@@ -167,15 +167,15 @@ def _is_plausible(opcode: int, length: int, head: bytes) -> bool:
     return length < MAX_CHUNK_SIZE and inside in (None, length)
 
 
-def _number(data: bytes, place: int, size: int) -> int | None:
-    """Return the number of `size` bytes at a place; None if the data end before."""
-    part = data[place : place + size]
+def _number(data: bytes, offset: int, size: int) -> int | None:
+    """Return the number of `size` bytes at an offset; None if the data end before."""
+    part = data[offset : offset + size]
     return int.from_bytes(part, "little") if len(part) == size else None
 
 
-def _is_blank(file: BinaryIO, place: int) -> bool:
-    """Return whether there are only zeros from a place on, as after a failure of the power."""
-    file.seek(place)
+def _is_blank(file: BinaryIO, offset: int) -> bool:
+    """Return whether there are only zeros from an offset on, as after a failure of the power."""
+    file.seek(offset)
     while block := file.read(BLOCK_SIZE):
         if any(block):
             return False
@@ -210,7 +210,7 @@ def _is_footer(opcode: int, length: int) -> bool:
 
 
 def _tail(file: BinaryIO) -> bytes:
-    """Return the bytes at the place of the footer, before the magic at the end."""
+    """Return the bytes at the offset of the footer, before the magic at the end."""
     size = file.seek(0, 2)
     file.seek(max(0, size - _FOOTER.size - len(MAGIC)))
     return file.read(_FOOTER.size).ljust(_FOOTER.size, b"\x00")

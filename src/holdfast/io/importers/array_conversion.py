@@ -29,7 +29,7 @@ from holdfast.io.importers.csv_columns import (
     guessed_time,
 )
 from holdfast.io.importers.table import Table, errors_named, first_texts, natural_order
-from holdfast.io.importers.table_recordings import (
+from holdfast.io.importers.table_conversion import (
     ANY_MODULE,
     MAX_MODULES,
     Report,
@@ -130,9 +130,9 @@ def recordings_of_arrays(
     for group, wanted in choice.by_group(sensors).items():
         names = _short_names(list(wanted)) if len(wanted) > 1 else [""]
         found: dict[str, Recording] = {}
-        for (place, one), module in zip(wanted.items(), names, strict=True):
+        for (array_path, one), module in zip(wanted.items(), names, strict=True):
             with errors_named(path):
-                parts = _recordings(choice, place, one, once)
+                parts = _recordings(choice, array_path, one, once)
             for recording in parts:
                 several = len(recording.modules) > 1
                 modules = {
@@ -184,10 +184,10 @@ class _Choice:
             )
         groups: dict[str, dict[str, Sensor]] = {}
         for key, one in sensors.items():
-            places = self._places(key.strip("/"), one)
-            names = _short_names(places) if len(places) > 1 else [""]
-            for place, name in zip(places, names, strict=True):
-                groups.setdefault(name, {})[place] = one
+            paths = self._paths(key.strip("/"), one)
+            names = _short_names(paths) if len(paths) > 1 else [""]
+            for path, name in zip(paths, names, strict=True):
+                groups.setdefault(name, {})[path] = one
         return groups
 
     def single_columns(self, sensors: Mapping[str, Sensor]) -> StoredArrays:
@@ -200,12 +200,10 @@ class _Choice:
             return {}
         lengths = Counter(prod(self.arrays[name].shape) for name in named)
         n_rows = max(lengths, key=lambda n: (n > 1, lengths[n]))
-        places = [name for name in named if self.arrays[name].shape == (n_rows,)]
-        return (
-            {name: self.arrays[name] for name in places} if len(places) >= 3 * one.n_taxels else {}
-        )
+        paths = [name for name in named if self.arrays[name].shape == (n_rows,)]
+        return {name: self.arrays[name] for name in paths} if len(paths) >= 3 * one.n_taxels else {}
 
-    def _places(self, key: str, one: Sensor) -> list[str]:
+    def _paths(self, key: str, one: Sensor) -> list[str]:
         """Return the paths of the arrays that a key means."""
         if key in self.arrays:
             return [key]
@@ -330,18 +328,18 @@ class _Choice:
 
 def _recordings(
     choice: _Choice,
-    place: str,
+    path: str,
     one: Sensor,
     report: ReportOnce,
 ) -> list[Recording]:
     """Return the recordings in an array, with the columns beside it."""
-    array, layout = choice.arrays[place], choice.layout(place, one)
+    array, layout = choice.arrays[path], choice.layout(path, one)
     if layout is None:
         if array.kind == "O":
             array.read()  # which gives the reason
         few = array.shape[-1:] in ((1,), (2,), (one.n_taxels,), (2 * one.n_taxels,))
         raise RecordingError(
-            f"{place!r} has shape {array.shape}; (samples, {one.n_taxels}, 3) or (samples, "
+            f"{path!r} has shape {array.shape}; (samples, {one.n_taxels}, 3) or (samples, "
             f"{3 * one.n_taxels}) expected ({one.name})"
             + (
                 f"; {THREE_AXES}"
@@ -354,24 +352,24 @@ def _recordings(
         for k, part in enumerate(choice.episodes(array.shape[:2]), start=1):
             recordings += [
                 replace(recording, name=f"{recording.name}-{k}")
-                for recording in _recordings(part, place, one, report)
+                for recording in _recordings(part, path, one, report)
             ]
         return recordings
     values = np.asarray(array.read(), dtype=np.float64).transpose(layout.axis, *layout.inner)
-    return _of_rows(choice, place, values.reshape(len(values), -1), one, report)
+    return _of_rows(choice, path, values.reshape(len(values), -1), one, report)
 
 
 def _of_rows(
-    choice: _Choice, place: str, rows: Array, one: Sensor, report: ReportOnce
+    choice: _Choice, path: str, rows: Array, one: Sensor, report: ReportOnce
 ) -> list[Recording]:
     """Return the recordings in the rows of an array, with the columns beside it."""
-    stored, given = choice.arrays[place], choice.columns
+    stored, given = choice.arrays[path], choice.columns
     n, width = rows.shape
-    found = {last: choice.arrays[other] for last, other in choice.beside(place).items()}
+    found = {last: choice.arrays[other] for last, other in choice.beside(path).items()}
     beside = {last: array for last, array in found.items() if prod(array.shape) == n}
     numbered = tuple(f"column{k + 1}" for k in range(width))
     names = stored.columns if len(stored.columns) == width else numbered
-    time = given.time or guessed_time(list(beside)) or choice.rate(place)
+    time = given.time or guessed_time(list(beside)) or choice.rate(path)
     taxels = given.taxels
     is_named = guessed_taxels(names, {one.n_taxels}, {one.unit}) is not None
     if taxels is None and not is_named and width % (3 * one.n_taxels) == 0:
@@ -380,11 +378,11 @@ def _of_rows(
         beside = {}
     elif time is None:
         raise RecordingError(
-            f"no times beside {place!r} {stored.shape}: give --columns time=100Hz with the true "
+            f"no times beside {path!r} {stored.shape}: give --columns time=100Hz with the true "
             f"rate, or time=ARRAY; it has {choice.listed}"
         )
     guess = replace(given, time=time, taxels=taxels)
-    what = f"{choice.path.name}: {place} {stored.shape}"
+    what = f"{choice.path.name}: {path} {stored.shape}"
     table = _table(choice, names, rows, beside)
     return recordings_of_table(
         table[0].names, lambda *_: table, what, {ANY_MODULE: one}, given, report, guess

@@ -8,8 +8,8 @@ import pytest
 from holdfast.contact import ContactState
 from holdfast.detection.features import tared_force
 from holdfast.io import load_recording, save_recording
-from holdfast.labelling.server import long_recordings, workspace
-from holdfast.labelling.server.long_recordings import load_for_labelling, without_force
+from holdfast.labelling.server import fingertip_forces, workspace
+from holdfast.labelling.server.fingertip_forces import load_for_labelling, without_force
 from holdfast.labelling.server.signals import SERIES
 from holdfast.recordings import Label, Recording
 from holdfast.synthetic import synthetic_recording
@@ -22,7 +22,7 @@ def path(tmp_path, monkeypatch):
     made = synthetic_recording("grasp", 3, FINGERS)
     path = tmp_path / "grasp.parquet"
     save_recording(replace(made, markers=((1.0, "closed"),)), path)
-    monkeypatch.setattr(long_recordings, "MAX_READINGS", 0)
+    monkeypatch.setattr(fingertip_forces, "MAX_READINGS", 0)
     return path
 
 

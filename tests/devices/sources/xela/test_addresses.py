@@ -3,13 +3,13 @@ import socket
 
 import pytest
 
-from holdfast.devices.sources.xela import places as module
-from holdfast.devices.sources.xela.places import places
+from holdfast.devices.sources.xela import addresses as module
+from holdfast.devices.sources.xela.addresses import server_addresses
 from holdfast.devices.uri import parse
 
 
 def found(text):
-    return [str(place) for place in places(parse(text)[1])]
+    return [str(address) for address in server_addresses(parse(text)[1])]
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ class ModuleBuffer:
         return times, readings
 
 
-class RecordingBuffer:
+class ArrivalBuffer:
     """Buffer incoming samples, markers and packet statistics of a recording, by module.
 
     It has no clock, and serves one thread.

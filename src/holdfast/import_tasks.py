@@ -12,9 +12,9 @@ from holdfast.errors import OutputError, RecordingError, is_installed
 from holdfast.files import file_stem, refuse_overwrite
 from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.dataset import load_dataset
+from holdfast.io.file_formats import is_recording
 from holdfast.io.importers import import_hint, import_parts
 from holdfast.io.importers.table import name_prefixes
-from holdfast.io.recording_files import is_recording
 from holdfast.labelling.review.findings import Finding, findings_of
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
