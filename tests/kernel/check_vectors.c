@@ -2,7 +2,8 @@
  *
  *     cc -std=c99 -I src/holdfast/kernel tests/kernel/check_vectors.c -o check -lm && ./check
  *
- * With -DHOLDFAST_VECTORS_FIXED the sizes are macros, as in an exported header; with
+ * With -DHOLDFAST_VECTORS_LINKED the kernel is linked, its files compiled each by itself. With
+ * -DHOLDFAST_VECTORS_FIXED the sizes are macros, as in an exported header; with
  * -DHOLDFAST_SINGLE numbers are of single precision, and only states, reasons and faults
  * are compared. */
 #include "vectors.h"

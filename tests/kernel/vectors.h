@@ -10,7 +10,11 @@
 #define HOLDFAST_N_LANES 12
 #define HOLDFAST_N_TAXELS 9
 #endif
+#ifdef HOLDFAST_VECTORS_LINKED
+#include "detector.h"
+#else
 #include "holdfast.c"
+#endif
 
 static const holdfast_finger hf_fingers[2] = {
 

@@ -32,13 +32,8 @@
 /* Least ratio of the mean squares of second and first differences in noise. It is 2 for
  * independent steps, 3 for white noise, 4 for a value that jumps up and down, less for motion. */
 #define HF_WHITE_RATIO ((hf_real)2.5)
-/* Least share of a finger's second differences in one noisy taxel: a touch spreads over the skin
- * to neighbouring taxels. */
-#define HF_LONE_SHARE ((hf_real)0.9)
 /* A taxel is noisy when it exceeds its least possible noise by this factor. */
 #define HF_LOUD_RATIO ((hf_real)100)
-/* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
-#define HF_MIN_TAXELS ((hf_real)4)
 /* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6: about 1, but not
  * rational. So whole counts have the same sum only if the sum of each axis is the same. */
 #define HF_WEIGHT_Y (HF_SQRT_2 / (hf_real)1.5)
@@ -46,18 +41,8 @@
 /* A pull for this long means that the tare was taken under load: nothing pulls a skin [s]. */
 #define HF_LOADED_SECONDS ((hf_real)0.25)
 
-/* Faults of a finger whose samples no window may hold, though they have a force. */
-enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };
-
-/* The readings of a finger in short. */
-typedef struct {
-    hf_real total; /* weighted sum; finite if all readings are */
-    hf_real least;
-    hf_real most;
-} hf_scan;
-
 /* Scan the readings of a finger (3, n). */
-static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
+HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 {
     const size_t n = f->n;
     hf_sum sum_x, sum_y, sum_z, minus_least, most;
@@ -91,7 +76,7 @@ static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 }
 
 /* Return the bits of the taxels with a reading that is not strictly between low and high. */
-static uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
+HF_SHARED uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
 {
     uint64_t bits = 0;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -107,7 +92,7 @@ static uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
 
 /* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return the bits of
  * these taxels. At least one reading of the finger is not valid. */
-static uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
+HF_SHARED uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
 {
     const uint64_t infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
     const uint64_t bits = hf_taxels_outside(
@@ -125,7 +110,7 @@ static uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
  *
  * A sensor with a dead band, or with less noise than a step of its readings, rests while nothing
  * moves it. */
-static bool hf_is_stuck(const hf_finger *f)
+HF_SHARED bool hf_is_stuck(const hf_finger *f)
 {
     /* Stuck: more than half of the steps before the rest changed a reading, 0.5 s of changes at
      * least, and the rest lasts max(0.5 s, 10 times the longest rest before). */
@@ -138,7 +123,7 @@ static bool hf_is_stuck(const hf_finger *f)
 }
 
 /* Return whether the normal readings add up to a pull, well above noise, for a long time. */
-static bool hf_is_pulled(const hf_finger *f, hf_real normal)
+HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal)
 {
     /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. Noise alone never reaches 20
      * deviations, and an elastomer that creeps falls by less than a tenth. */
@@ -159,7 +144,7 @@ static bool hf_differ(const hf_real *readings, const hf_real *previous, size_t n
 }
 
 /* Return false for zeros: a sensor with a dead band jumps to and from zero without noise. */
-static bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
+HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
 {
     return readings[i] != 0 || readings[n + i] != 0 || readings[2 * n + i] != 0;
 }
@@ -500,7 +485,7 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
 }
 
 /* Count a valid sample of a finger, and compare it with the one before. */
-static void hf_track_changes(const hf_finger *f, double time, bool after_gap)
+HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap)
 {
     holdfast_finger_memory *const s = f->state;
     if (s->n_seen == 0) {

@@ -273,7 +273,7 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
 /* Take the field out of the readings of a finger. Return its faults.
  *
  * left_out: bits of the taxels that do not count. */
-static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
 {
     holdfast_finger_memory *const s = f->state;
     if (!(f->finger->max_field > 0) || isnan(s->noise)) {

@@ -433,9 +433,19 @@ typedef struct {
 } holdfast_memory;
 /* clang-format on */
 
-/* Functions of the interface: part of each source file that includes an exported header. */
+/* Each file can be compiled by itself: then HF_SHARED, before functions that files share, and
+ * HF_API, before those of the interface, give names to the linker. A file that joins the others
+ * (kernel.c) defines HF_SHARED as static: compilers then see all functions, and an exported header
+ * is part of each source file that includes it. */
 #ifndef HF_API
+#ifdef HF_SHARED
 #define HF_API static inline
+#else
+#define HF_API extern
+#endif
+#endif
+#ifndef HF_SHARED
+#define HF_SHARED
 #endif
 
 #ifdef __cplusplus

@@ -23,7 +23,7 @@
 
 /* Let the taxels of some bits, which are at a limit now, count for their last reading. The
  * difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
-static void hf_note_saturated(const hf_finger *f, uint64_t bits)
+HF_SHARED void hf_note_saturated(const hf_finger *f, uint64_t bits)
 {
     for (size_t i = 0; i < f->n_taxels; ++i) {
         for (size_t axis = 0; axis < 3 && (bits & hf_bit(i)); ++axis) {
@@ -34,7 +34,7 @@ static void hf_note_saturated(const hf_finger *f, uint64_t bits)
 }
 
 /* Set the readings of the taxels without a tare to a valid number that never changes. */
-static void hf_hold_lost(const hf_finger *f)
+HF_SHARED void hf_hold_lost(const hf_finger *f)
 {
     const hf_real low = f->finger->low, high = f->finger->high;
     const hf_real neutral = low < 0 && 0 < high ? 0 : (low + high) / 2;
@@ -56,7 +56,7 @@ static size_t hf_n_bits(uint64_t bits)
 }
 
 /* Count a sample of the tare that is not valid, and leave out its taxels if it lasts. */
-static void hf_lose_taxels(const hf_finger *f, uint32_t faults, uint64_t bits)
+HF_SHARED void hf_lose_taxels(const hf_finger *f, uint32_t faults, uint64_t bits)
 {
     holdfast_finger_memory *const s = f->state;
     const uint64_t lost = s->lost | bits;
@@ -168,7 +168,7 @@ static hf_weight hf_weigh(const hf_finger *f, uint64_t bits)
 
 /* Replace the readings of some bits, which are not valid, by the last that were. Return whether
  * enough are valid. */
-static bool hf_replace_invalid(const hf_finger *f, uint64_t bits)
+HF_SHARED bool hf_replace_invalid(const hf_finger *f, uint64_t bits)
 {
     holdfast_finger_memory *const s = f->state;
     if (bits == 0 || f->n_taxels > HF_N_MASK_BITS) {
@@ -326,7 +326,7 @@ static void hf_fill_taxels(const hf_finger *f)
 }
 
 /* Fill in the faulty taxels of a finger. Return false, and fill none, if they carry too much. */
-static bool hf_mask_taxels(const hf_finger *f, uint64_t bits, double time)
+HF_SHARED bool hf_mask_taxels(const hf_finger *f, uint64_t bits, double time)
 {
     const holdfast_finger_memory *const s = f->state;
     if (f->n_taxels > HF_N_MASK_BITS) {

@@ -3,7 +3,7 @@
 #include "finger.h"
 
 /* Return one finger of a hand: its constants, and its part of the memory. */
-static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
+HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
 {
     const holdfast_finger *const finger = &hand->fingers[index];
     const size_t first = finger->first, n_lags = HF_N_LAGS(hand);
@@ -40,7 +40,7 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
 }
 
 /* Copy rows of taxels (n_taxels, 3) to the lanes of a finger (3, n); 0 for ignored taxels. */
-static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
+HF_SHARED void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
 {
     const hf_real *const row = rows + 3 * f->finger->first_taxel;
     const size_t n = f->n;
@@ -58,7 +58,7 @@ static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *l
     }
 }
 
-static void hf_clear_values(holdfast_values *values)
+HF_SHARED void hf_clear_values(holdfast_values *values)
 {
     hf_fill(values->force, 3, HF_NAN);
     values->amplitude = values->m = values->sigma = HF_NAN;

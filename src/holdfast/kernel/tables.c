@@ -1,7 +1,7 @@
 /* Tables and memory of a stream: what is checked once, and the state before the first sample. */
 #include "finger.h"
 
-static bool hf_are_finite(const hf_real *values, size_t n)
+HF_SHARED bool hf_are_finite(const hf_real *values, size_t n)
 {
     bool are_finite = true;
     for (size_t i = 0; i < n; ++i) {

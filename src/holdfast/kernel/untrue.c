@@ -196,7 +196,7 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
 }
 
 /* Return the bits of the magnetometers that read zeros, or jump alone, at this sample. */
-static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
+HF_SHARED uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
     const uint64_t before = s->jumped;
@@ -253,7 +253,7 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
 }
 
 /* Return the faults of a finger whose readings, all valid, cannot be true; 0 without any. */
-static uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
+HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
     uint32_t faults = hf_follow_ring(f, scan->total) ? HOLDFAST_REPEATED : 0;
