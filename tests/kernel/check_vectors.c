@@ -82,7 +82,7 @@ static void run(holdfast_detector_memory *d)
             /* Two causes may be nearly equal: there single precision is not compared. */
             check("the cause", k, e->cause, (double)*code++, 6 * IS_SINGLE);
             check("the faults", k, e->faults, (double)*code++, 0);
-            check("the taxels", k, (double)e->faulty_taxels, (double)*code++, 0);
+            check("the taxels", k, (double)e->faulty_taxels[0], (double)*code++, 0);
         }
         if (k % EVERY == 0 && !IS_SINGLE) {
             expected = check_numbers(d, estimates, k, expected);

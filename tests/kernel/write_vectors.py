@@ -136,7 +136,7 @@ def main():
         given += [number(time), *map(str, present.astype(int)), *map(number, readings.ravel())]
         codes += [str(int(hand[k]))]
         for row in estimates[k]:
-            codes += [str(int(row[name])) for name in CODES]
+            codes += [str(int(np.ravel(row[name])[0])) for name in CODES]
             if k % EVERY == 0:
                 numbers += [number(float(row[name])) for name in NUMBERS]
                 numbers += map(number, row["force"].tolist())

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import repeat
 from math import nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,7 @@ from holdfast.contact import (
     HandEstimate,
     Reason,
     faults_of,
+    n_mask_words,
     taxels_of,
 )
 from holdfast.errors import require_extras
@@ -25,13 +26,14 @@ from holdfast.kernel import _extension
 from holdfast.model import FingerModel
 from holdfast.recordings import Recording
 from holdfast.sensors import taxel_numbers
-from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.sensors.types import Array, Flags
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
+Mask = TypeVar("Mask", int, bytes)
 CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
 
 
@@ -75,7 +77,8 @@ class FingerTrace(NamedTuple):
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`; `faults_of(bits)` of `holdfast.contact` are the
             faults.
-        faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
+        faulty_taxels: (n, n_words) bit i % 64 of word i // 64 is set if the taxel at index i is
+            faulty by itself; `taxels_of(words)` of `holdfast.contact` are the indices.
         cause: (n,) codes of the causes while UNSTABLE, or while it slides; 0 for none, of which
             any other is `Cause(code)`.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
@@ -91,7 +94,7 @@ class FingerTrace(NamedTuple):
     instability: Array
     force: Array
     faults: npt.NDArray[np.int32]
-    faulty_taxels: Integers
+    faulty_taxels: npt.NDArray[np.uint64]
     cause: npt.NDArray[np.int8]
     slip_probability: Array | None = None
     slip_speed: Array | None = None
@@ -109,7 +112,10 @@ class FingerTrace(NamedTuple):
         # None instead of a column: the model has no such head.
         given = (self.slip_probability, self.slip_speed, self.slip_distance)
         slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
-        columns = (column[rows].tolist() for column in self[:-3])
+        columns = (
+            column[rows] if column is self.faulty_taxels else column[rows].tolist()
+            for column in self[:-3]
+        )
         return [
             ContactEstimate(
                 time, STATE_BY_CODE[state], REASON_BY_CODE[reason], probability, sigma,
@@ -156,14 +162,14 @@ class Detection:
         def words(codes: npt.NDArray[Any], kind: type[StrEnum]) -> Any:  # noqa: ANN401 (of pandas)
             return pd.Categorical.from_codes(codes, [word.value for word in kind])
 
-        def texts(masks: npt.NDArray[Any], names: Callable[[int], Iterable[object]]) -> list[str]:
-            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks.tolist())}
-            return [known[mask] for mask in masks.tolist()]
+        def texts(masks: Sequence[Mask], names: Callable[[Mask], Iterable[object]]) -> list[str]:
+            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
+            return [known[mask] for mask in masks]
 
         parts = []
         for finger, trace in self.fingers.items():
             # A fault of the whole finger names no taxel, as in `ContactEstimate`.
-            taxels = np.where(trace.faults, trace.faulty_taxels, 0)
+            taxels = np.where(trace.faults[:, None] != 0, trace.faulty_taxels, 0)
             slips = {
                 name: nan if getattr(trace, name) is None else getattr(trace, name)
                 for name in ("slip_probability", "slip_speed", "slip_distance")
@@ -176,8 +182,11 @@ class Detection:
                 "stable_probability": trace.stable_probability,
                 "instability": trace.instability,
                 **{f"force_{axis}": trace.force[:, k] for k, axis in enumerate("xyz")},
-                "faults": texts(trace.faults, faults_of),
-                "faulty_taxels": texts(taxels, lambda mask: taxel_numbers(taxels_of(mask))),
+                "faults": texts(trace.faults.tolist(), faults_of),
+                "faulty_taxels": texts(
+                    [words.tobytes() for words in taxels],
+                    lambda words: taxel_numbers(taxels_of(words)),
+                ),
                 "cause": words(trace.cause - 1, Cause),  # -1, which is no cause, is missing
                 **slips,
                 "hand": words(self.hand[np.searchsorted(self.times, trace.times)], ContactState),
@@ -204,7 +213,7 @@ class Chunk(NamedTuple):
 
 TRACE_COLUMNS = (
     ("state", np.int8), ("reason", np.int8), ("probability", np.float64), ("sigma", np.float64),
-    ("force", np.float64), ("faults", np.int32), ("taxels", np.int64), ("cause", np.int8),
+    ("force", np.float64), ("faults", np.int32), ("taxels", np.uint64), ("cause", np.int8),
     ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
 )  # fmt: skip
 """Fields of `ESTIMATE` in the order of `FingerTrace` after its times, and their types there."""
@@ -229,15 +238,16 @@ def detection_of(
     found = {}
     for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True):
         if finger in recording.modules and recording.modules[finger].n_samples:
-            n = recording.modules[finger].n_samples
+            module = recording.modules[finger]
+            n, widths = module.n_samples, {"force": 3, "taxels": n_mask_words(module.sensor.n_taxels)}
             # Missing are slip, speed and distance without a head of slips, the last two without
             # `slip_speed`.
             n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
             columns: list[npt.NDArray[Any]] = [
-                np.empty((n, 3) if field == "force" else n, number)
+                np.empty((n, widths[field]) if field in widths else n, number)
                 for field, number in TRACE_COLUMNS[:n_columns]
             ]
-            found[finger] = FingerTrace(recording.modules[finger].times, *columns)
+            found[finger] = FingerTrace(module.times, *columns)
     ends = dict.fromkeys(found, 0)  # rows of each finger that are filled
     for chunk in chunks:
         times.append(chunk.times)
@@ -250,5 +260,7 @@ def detection_of(
             ends[finger] = part.stop
             for column, (field, _) in zip(found[finger][1:], TRACE_COLUMNS, strict=True):
                 if column is not None:
-                    column[part] = rows[field]
+                    # The words that the sensor does not need are left out.
+                    values = rows[field][:, : column.shape[1]] if column.ndim > 1 else rows[field]
+                    column[part] = values
     return Detection(recording.name, found, np.concatenate(times), np.concatenate(hand))

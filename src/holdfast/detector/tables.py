@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import CAUSES, SLIP_CODE
+from holdfast.contact import CAUSES, MAX_TAXELS, SLIP_CODE, n_mask_words
 from holdfast.features.tables import StreamPlan, Struct
 from holdfast.model import FingerModel, Head, Model
 from holdfast.model.heads import HEAD_NAMES
@@ -17,9 +17,9 @@ Rules = tuple[list[Struct], list[Struct], Array]
 ESTIMATE = np.dtype(
     [
         ("time", np.float64), ("state", np.int32), ("reason", np.int32), ("cause", np.int32),
-        ("faults", np.uint32), ("taxels", np.int64), ("probability", np.float64),
-        ("slip", np.float64), ("speed", np.float64), ("distance", np.float64),
-        ("sigma", np.float64), ("force", np.float64, 3),
+        ("faults", np.uint32), ("taxels", np.uint64, n_mask_words(MAX_TAXELS)),
+        ("probability", np.float64), ("slip", np.float64), ("speed", np.float64),
+        ("distance", np.float64), ("sigma", np.float64), ("force", np.float64, 3),
     ]
 )  # fmt: skip
 """`holdfast_finger_estimate`."""

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from holdfast.contact import Fault, Reason
+from holdfast.contact import Fault, Reason, n_mask_words
 from holdfast.detector.tables import model_table, rules_of
 from holdfast.errors import ModelError
 from holdfast.features.start import OPEN_HAND, Start
@@ -117,6 +117,7 @@ class Tables:
         own_heads = [{"heads": heads[k : k + n_heads]} for k in range(0, len(heads), n_heads)]
         self.sizes: dict[str, Any] = {k: n for k, n in hand.items() if k.startswith("n_")}
         self.sizes["n_taxels"] = len(baseline)
+        self.sizes["mask_words"] = max(n_mask_words(s.n_taxels) for s in plan.sensors.values())
         # Lengths of arrays in the kernel are numbers, its own constants, or sizes of the hand.
         names = {name: int(value) for name, value in re.findall(r"(\w+_N_\w+) = (\d+)", kernel)}
         names |= {f"HOLDFAST_{name.upper()}": n for name, n in self.sizes.items()}

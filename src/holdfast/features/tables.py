@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from holdfast.contact import MAX_TAXELS
+from holdfast.errors import ModelError
 from holdfast.features.haar import n_levels
 from holdfast.features.specs import (
     KINDS,
@@ -68,6 +70,9 @@ class StreamPlan:
         rate: samples per second [Hz].
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
         start: with an open hand, or in contact.
+
+    Raises:
+        ModelError: a sensor has more than `MAX_TAXELS`.
     """
 
     sensors: Mapping[str, Sensor]
@@ -77,6 +82,14 @@ class StreamPlan:
     rate: float
     ignore: Mapping[str, Sequence[int]] = field(default_factory=dict)
     start: Start = OPEN_HAND
+
+    def __post_init__(self) -> None:
+        for name, sensor in self.sensors.items():
+            if sensor.n_taxels > MAX_TAXELS:
+                raise ModelError(
+                    f"{name}: a sensor of {sensor.n_taxels} taxels given ({sensor.name}); "
+                    f"at most {MAX_TAXELS} expected"
+                )
 
     @property
     def used_tare(self) -> Tare:

@@ -47,7 +47,7 @@ static void hf_fill_estimate(
         out->cause = HOLDFAST_CAUSE_SLIP;
     }
     out->faults = f->values->faults;
-    out->faulty_taxels = f->values->taxels;
+    memcpy(out->faulty_taxels, f->values->taxels.words, sizeof out->faulty_taxels);
     out->stable_probability = d->probability;
     out->slip_probability = d->slip_probability;
     out->slip_speed = d->speed;

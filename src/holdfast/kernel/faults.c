@@ -75,35 +75,35 @@ HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
     return scan;
 }
 
-/* Return the bits of the taxels with a reading that is not strictly between low and high. */
-HF_SHARED uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
+/* Return the taxels with a reading that is not strictly between low and high. */
+HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
 {
-    uint64_t bits = 0;
+    holdfast_taxel_set outside = {{0}};
     for (size_t axis = 0; axis < 3; ++axis) {
         for (size_t i = 0; i < f->n_taxels; ++i) {
             const hf_real reading = f->readings[axis * f->n + i];
             if (!(low < reading && reading < high) && f->used[i] > 0) {
-                bits |= hf_bit(i);
+                hf_include(&outside, i);
             }
         }
     }
-    return bits;
+    return outside;
 }
 
-/* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return the bits of
- * these taxels. At least one reading of the finger is not valid. */
-HF_SHARED uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
+/* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return these
+ * taxels. At least one reading of the finger is not valid. */
+HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults)
 {
-    const uint64_t infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
-    const uint64_t bits = hf_taxels_outside(
+    const holdfast_taxel_set infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
+    const holdfast_taxel_set invalid = hf_taxels_outside(
         f, hf_nextafter(f->finger->low, -HF_INFINITY), hf_nextafter(f->finger->high, HF_INFINITY));
-    if (infinite) {
+    if (!hf_is_empty(f, &infinite)) {
         *faults |= HOLDFAST_NOT_FINITE;
     }
-    if (bits != infinite) {
+    if (!hf_are_equal(f, &invalid, &infinite)) {
         *faults |= HOLDFAST_OUT_OF_RANGE;
     }
-    return bits;
+    return invalid;
 }
 
 /* Return whether the readings of a finger stopped changing after they had changed.
@@ -346,7 +346,7 @@ static void hf_find_still_taxels(const hf_finger *f)
         return;
     }
     /* A taxel at a limit of its range is saturated, not stuck. */
-    const uint64_t at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
+    const holdfast_taxel_set at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const int64_t still = s->n_changes - taxel->changed_at;
@@ -363,10 +363,10 @@ static void hf_find_still_taxels(const hf_finger *f)
         }
         if (taxel->n_changed == 0) {
             s->taxel_faults |= HOLDFAST_DEAD;
-            s->faulty_taxels |= hf_bit(i);
-        } else if ((at_limit & hf_bit(i)) == 0) {
+            hf_include(&s->faulty_taxels, i);
+        } else if (!hf_has(&at_limit, i)) {
             s->taxel_faults |= HOLDFAST_STUCK;
-            s->faulty_taxels |= hf_bit(i);
+            hf_include(&s->faulty_taxels, i);
         }
     }
 }
@@ -390,8 +390,8 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
     const hf_real loud = HF_LOUD_RATIO * quiet;
     if (second_power > HF_WHITE_RATIO * first_power && second_power > 6 * (loud * loud)) {
         s->taxel_faults |= HOLDFAST_NOISY;
-        s->noisy_taxels = hf_bit(loudest);
-        s->faulty_taxels |= s->noisy_taxels;
+        hf_include(&s->noisy_taxels, loudest);
+        hf_include(&s->faulty_taxels, loudest);
     }
 }
 
@@ -410,13 +410,14 @@ static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
     return (hf_real)taxel->n_same[axis] >= limit;
 }
 
-/* Return the bits of the magnetometers of which an axis is stuck, while that of the others moves.
+/* Return the magnetometers of which an axis is stuck, while that of the others moves.
  *
  * Whole counts with little noise repeat, so an axis is compared with its own past. */
-static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
+static holdfast_taxel_set hf_find_stuck_axis(const hf_finger *f, size_t axis)
 {
     const hf_real *const readings = f->readings + axis * f->n;
-    const uint64_t stuck = f->state->stuck_axes[axis];
+    const holdfast_taxel_set *const before = &f->state->stuck_axes[axis];
+    holdfast_taxel_set stuck = {{0}};
     const int32_t least = (int32_t)(HF_DEAD_SECONDS / HF_COMPARED_SECONDS);
     bool is_any_same = false;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -426,7 +427,7 @@ static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
             is_any_same |= taxel->n_same[axis] >= least && f->used[i] > 0;
             continue;
         }
-        if (taxel->n_same[axis] > taxel->longest_same[axis] && !(stuck & hf_bit(i))) {
+        if (taxel->n_same[axis] > taxel->longest_same[axis] && !hf_has(before, i)) {
             taxel->longest_same[axis] = taxel->n_same[axis];
         }
         taxel->compared[axis] = readings[i];
@@ -434,7 +435,7 @@ static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
         taxel->n_differed[axis] += 1;
     }
     if (!is_any_same) {
-        return 0;
+        return stuck;
     }
     hf_real n_moving = 0;
     int32_t longest = 0; /* of those that move */
@@ -446,14 +447,13 @@ static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
             longest = taxel->longest_same[axis] > longest ? taxel->longest_same[axis] : longest;
         }
     }
-    uint64_t bits = 0;
     for (size_t i = 0; n_moving >= HF_MOVING_SHARE * f->finger->n_used && i < f->n_taxels; ++i) {
         const bool at_limit = readings[i] <= f->finger->low || readings[i] >= f->finger->high;
         if (f->used[i] > 0 && !at_limit && hf_is_same(&f->taxels[i], axis, longest)) {
-            bits |= hf_bit(i);
+            hf_include(&stuck, i);
         }
     }
-    return bits;
+    return stuck;
 }
 
 /* Find the faulty taxels of a finger at a sample that changed a reading. */
@@ -473,9 +473,11 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
             s->stuck_axes[axis] = hf_find_stuck_axis(f, axis);
         }
     }
-    s->faulty_taxels = s->stuck_axes[0] | s->stuck_axes[1] | s->stuck_axes[2];
-    s->taxel_faults = s->faulty_taxels ? HOLDFAST_STUCK : 0;
-    s->noisy_taxels = 0;
+    s->faulty_taxels = s->stuck_axes[0];
+    hf_unite(f, &s->faulty_taxels, &s->stuck_axes[1]);
+    hf_unite(f, &s->faulty_taxels, &s->stuck_axes[2]);
+    s->taxel_faults = hf_is_empty(f, &s->faulty_taxels) ? 0 : HOLDFAST_STUCK;
+    hf_clear(&s->noisy_taxels);
     if (changes.any_still) {
         hf_find_still_taxels(f);
     }

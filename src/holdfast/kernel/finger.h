@@ -71,10 +71,63 @@ static inline hf_real *hf_forces_at(const hf_finger *f, size_t place)
     return f->taxel_forces + place * 3 * HF_N_LANES(f->hand);
 }
 
-/* Return the bit of a taxel in a mask; 0 for a taxel that the mask cannot hold. */
-static inline uint64_t hf_bit(size_t taxel)
+/* Return the words of a set that a finger needs. */
+static inline size_t hf_n_words(const hf_finger *f)
 {
-    return taxel < HF_N_MASK_BITS ? (uint64_t)1 << taxel : 0;
+    return HOLDFAST_MASK_WORDS > 1 ? (f->n_taxels + 63) / 64 : 1;
+}
+
+static inline bool hf_has(const holdfast_taxel_set *set, size_t taxel)
+{
+    return set->words[taxel / 64] >> taxel % 64 & 1;
+}
+
+static inline void hf_include(holdfast_taxel_set *set, size_t taxel)
+{
+    set->words[taxel / 64] |= (uint64_t)1 << taxel % 64;
+}
+
+static inline void hf_clear(holdfast_taxel_set *set)
+{
+    const holdfast_taxel_set none = {{0}};
+    *set = none;
+}
+
+/* Add the taxels of another set. */
+static inline void hf_unite(
+    const hf_finger *f, holdfast_taxel_set *set, const holdfast_taxel_set *other)
+{
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        set->words[k] |= other->words[k];
+    }
+}
+
+/* Remove the taxels of another set. */
+static inline void hf_exclude(
+    const hf_finger *f, holdfast_taxel_set *set, const holdfast_taxel_set *other)
+{
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        set->words[k] &= ~other->words[k];
+    }
+}
+
+static inline bool hf_is_empty(const hf_finger *f, const holdfast_taxel_set *set)
+{
+    uint64_t any = 0;
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        any |= set->words[k];
+    }
+    return any == 0;
+}
+
+static inline bool hf_are_equal(
+    const hf_finger *f, const holdfast_taxel_set *a, const holdfast_taxel_set *b)
+{
+    uint64_t differences = 0;
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        differences |= a->words[k] ^ b->words[k];
+    }
+    return differences == 0;
 }
 
 /* Return the row of a ring that lies n rows before another; faster than a remainder. */
@@ -172,29 +225,30 @@ typedef struct {
 
 /* faults.c */
 HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings);
-HF_SHARED uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high);
-HF_SHARED uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults);
+HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high);
+HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults);
 HF_SHARED bool hf_is_stuck(const hf_finger *f);
 HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
 HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
 HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
 
 /* untrue.c */
-HF_SHARED uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan);
+HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
 HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan);
 
 /* tare.c */
 HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
 
 /* field.c */
-HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out);
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out);
 
 /* masks.c */
-HF_SHARED void hf_note_saturated(const hf_finger *f, uint64_t bits);
+HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit);
 HF_SHARED void hf_hold_lost(const hf_finger *f);
-HF_SHARED void hf_lose_taxels(const hf_finger *f, uint32_t faults, uint64_t bits);
-HF_SHARED bool hf_replace_invalid(const hf_finger *f, uint64_t bits);
-HF_SHARED bool hf_mask_taxels(const hf_finger *f, uint64_t bits, double time);
+HF_SHARED void hf_lose_taxels(
+    const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid);
+HF_SHARED bool hf_replace_invalid(const hf_finger *f, const holdfast_taxel_set *invalid);
+HF_SHARED bool hf_mask_taxels(const hf_finger *f, const holdfast_taxel_set *faulty, double time);
 
 /* motion.c */
 HF_SHARED hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3]);

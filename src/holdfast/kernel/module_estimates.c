@@ -70,7 +70,10 @@ static PyObject *make_finger(const estimates *e, Py_ssize_t i)
         PyFloat_FromDouble(f->instability),
         Py_BuildValue("(ddd)", f->force[0], f->force[1], f->force[2]),
         f->faults ? from_mask(maker(e, FAULTS_OF), f->faults) : PyTuple_New(0),
-        f->faults ? from_mask(maker(e, TAXELS_OF), f->faulty_taxels) : PyTuple_New(0),
+        f->faults ? PyObject_CallFunction(
+                        maker(e, TAXELS_OF), "y#", (const char *)f->faulty_taxels,
+                        (Py_ssize_t)sizeof f->faulty_taxels)
+                  : PyTuple_New(0),
         Py_XNewRef(PyTuple_GetItem(maker(e, CAUSE_OBJECTS), f->cause)),
         number_or_none(f->slip_probability, heads > 0),
         number_or_none(f->slip_speed, has_speed),

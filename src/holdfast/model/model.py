@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.classifiers import Linear
+from holdfast.contact import MAX_TAXELS
 from holdfast.errors import ModelError
 from holdfast.features import DEFAULT_WINDOW, FeatureSpec, Tare
 from holdfast.features.stream import extract
@@ -21,7 +22,6 @@ from holdfast.model.files import decode, encode, read_model, write_model
 from holdfast.model.heads import Choice, Head, HeadName
 from holdfast.model.parts import (
     MAX_FINGERS,
-    MAX_TAXELS,
     MAX_WINDOW,
     Debounce,
     FingerModel,

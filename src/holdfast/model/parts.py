@@ -16,8 +16,6 @@ MAX_FEATURES = 1024
 """Maximum number of features of a finger."""
 MAX_FINGERS = 256
 """Maximum number of fingers, and of sensors, in a model."""
-MAX_TAXELS = 4096
-"""Maximum number of taxels of a sensor in a model."""
 
 
 class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
