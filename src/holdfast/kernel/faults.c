@@ -410,14 +410,13 @@ static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
     return (hf_real)taxel->n_same[axis] >= limit;
 }
 
-/* Return the magnetometers of which an axis is stuck, while that of the others moves.
+/* Find the magnetometers of which an axis is stuck, while that of the others moves.
  *
  * Whole counts with little noise repeat, so an axis is compared with its own past. */
-static holdfast_taxel_set hf_find_stuck_axis(const hf_finger *f, size_t axis)
+static void hf_find_stuck_axis(const hf_finger *f, size_t axis)
 {
     const hf_real *const readings = f->readings + axis * f->n;
-    const holdfast_taxel_set *const before = &f->state->stuck_axes[axis];
-    holdfast_taxel_set stuck = {{0}};
+    holdfast_taxel_set *const stuck = &f->state->stuck_axes[axis];
     const int32_t least = (int32_t)(HF_DEAD_SECONDS / HF_COMPARED_SECONDS);
     bool is_any_same = false;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -427,15 +426,19 @@ static holdfast_taxel_set hf_find_stuck_axis(const hf_finger *f, size_t axis)
             is_any_same |= taxel->n_same[axis] >= least && f->used[i] > 0;
             continue;
         }
-        if (taxel->n_same[axis] > taxel->longest_same[axis] && !hf_has(before, i)) {
+        if (taxel->n_same[axis] > taxel->longest_same[axis] && !hf_has(stuck, i)) {
             taxel->longest_same[axis] = taxel->n_same[axis];
         }
         taxel->compared[axis] = readings[i];
         taxel->n_same[axis] = 0;
         taxel->n_differed[axis] += 1;
     }
+    if (f->state->has_stuck_axis[axis]) {
+        hf_clear(stuck);
+        f->state->has_stuck_axis[axis] = false;
+    }
     if (!is_any_same) {
-        return stuck;
+        return;
     }
     hf_real n_moving = 0;
     int32_t longest = 0; /* of those that move */
@@ -450,10 +453,10 @@ static holdfast_taxel_set hf_find_stuck_axis(const hf_finger *f, size_t axis)
     for (size_t i = 0; n_moving >= HF_MOVING_SHARE * f->finger->n_used && i < f->n_taxels; ++i) {
         const bool at_limit = readings[i] <= f->finger->low || readings[i] >= f->finger->high;
         if (f->used[i] > 0 && !at_limit && hf_is_same(&f->taxels[i], axis, longest)) {
-            hf_include(&stuck, i);
+            hf_include(stuck, i);
+            f->state->has_stuck_axis[axis] = true;
         }
     }
-    return stuck;
 }
 
 /* Find the faulty taxels of a finger at a sample that changed a reading. */
@@ -470,14 +473,20 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
         const int64_t interval = turns > 1 ? (int64_t)lrint(turns) : 1;
         if (s->n_changes % interval == 0) {
             const size_t axis = (size_t)(s->n_changes / interval % 3);
-            s->stuck_axes[axis] = hf_find_stuck_axis(f, axis);
+            hf_find_stuck_axis(f, axis);
         }
     }
-    s->faulty_taxels = s->stuck_axes[0];
-    hf_unite(f, &s->faulty_taxels, &s->stuck_axes[1]);
-    hf_unite(f, &s->faulty_taxels, &s->stuck_axes[2]);
-    s->taxel_faults = hf_is_empty(f, &s->faulty_taxels) ? 0 : HOLDFAST_STUCK;
-    hf_clear(&s->noisy_taxels);
+    if (s->taxel_faults) { /* of the last sample */
+        hf_clear(&s->faulty_taxels);
+        hf_clear(&s->noisy_taxels);
+        s->taxel_faults = 0;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+        if (s->has_stuck_axis[axis]) {
+            hf_unite(f, &s->faulty_taxels, &s->stuck_axes[axis]);
+            s->taxel_faults = HOLDFAST_STUCK;
+        }
+    }
     if (changes.any_still) {
         hf_find_still_taxels(f);
     }

@@ -364,6 +364,7 @@ typedef struct {
     holdfast_taxel_set faulty_taxels; /* those taxels */
     holdfast_taxel_set noisy_taxels;  /* the noisy ones among them */
     holdfast_taxel_set stuck_axes[3]; /* magnetometers of which this axis does not change */
+    bool has_stuck_axis[3];           /* there are some */
     /* Taxels that are left out (masks.c). */
     int64_t n_refused;         /* successive samples of the tare with a reading that is not valid */
     holdfast_taxel_set lost;   /* taxels that have no tare */

@@ -203,12 +203,13 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     if (!f->finger->is_magnetic || s->n_seen == 0) {
         return false;
     }
-    const holdfast_taxel_set before = s->jumped;
-    hf_clear(&s->jumped);
     hf_steps steps = hf_find_steps(f);
     if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
+        hf_clear(&s->jumped);
         return false;
     }
+    const holdfast_taxel_set before = s->jumped;
+    hf_clear(&s->jumped);
     hf_clear(jumps);
     /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
