@@ -67,7 +67,7 @@ class TestEstimates:
     def test_they_have_the_layout_of_the_struct(self):
         assert _extension.Estimates.__itemsize__ == ESTIMATE.itemsize
         fields = {"estimate": structs_of(kernel_text())["holdfast_finger_estimate"]}
-        struct = ctypes_of(fields, {}, single=False)["estimate"]
+        struct = ctypes_of(fields, {"HOLDFAST_MASK_WORDS": 8}, single=False)["estimate"]
         offsets = {name: getattr(struct, name).offset for name, *_ in struct._fields_}
         short = {
             "faulty_taxels": "taxels", "stable_probability": "probability",

@@ -3,6 +3,7 @@ import copy
 import numpy as np
 import pytest
 
+from detector.build import sensor as made
 from holdfast.features import Tare
 from holdfast.features.specs import ANY_FEATURES, HOLDFAST_FEATURES
 from holdfast.features.stream import FeatureStream
@@ -119,6 +120,19 @@ class TestCheck:
             tables[2][place] = tables[2][place] | {"of_hand": True}
 
         assert refused(FeatureStream(plan), change) == "of_hand of a padding"
+
+    def test_a_set_holds_512_taxels(self):
+        def change(tables):
+            tables[0]["n_lanes"] = 516
+            tables[1][0] |= {"n_taxels": 513, "n_used": 513.0}
+            tables[4:] = np.arange(516) < 513.0, np.zeros(9 * 516), np.zeros(3 * 516), baseline
+            tables[4] = tables[4].astype(float)
+
+        baseline = np.zeros((513, 3))
+        plan = StreamPlan({"f": made(512)}, {"f": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
+        stream = FeatureStream(plan)
+        stream.start()  # 512
+        assert refused(stream, change) == "first, first_taxel or n_taxels of a finger"
 
     def test_normals_are_finite(self, stream):
         wrong = refused(stream, lambda tables: tables[1][1].update({"normal[2]": np.inf}))

@@ -9,6 +9,7 @@
 #define HOLDFAST_N_TRACK 13
 #define HOLDFAST_N_LANES 12
 #define HOLDFAST_N_TAXELS 9
+#define HOLDFAST_MASK_WORDS 1
 #endif
 #ifdef HOLDFAST_VECTORS_LINKED
 #include "detector.h"

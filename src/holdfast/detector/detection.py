@@ -239,7 +239,10 @@ def detection_of(
     for finger, n_slips in zip(fingers, _slip_heads(parts), strict=True):
         if finger in recording.modules and recording.modules[finger].n_samples:
             module = recording.modules[finger]
-            n, widths = module.n_samples, {"force": 3, "taxels": n_mask_words(module.sensor.n_taxels)}
+            n, widths = (
+                module.n_samples,
+                {"force": 3, "taxels": n_mask_words(module.sensor.n_taxels)},
+            )
             # Missing are slip, speed and distance without a head of slips, the last two without
             # `slip_speed`.
             n_columns = len(TRACE_COLUMNS) - (3, 2, 0)[n_slips]
