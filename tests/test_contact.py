@@ -23,6 +23,7 @@ from holdfast.contact import (
     faults_of,
     hand_state,
     hand_states,
+    n_mask_words,
     taxels_of,
     with_faults,
 )
@@ -118,9 +119,11 @@ def test_estimates_can_be_written_as_json():
         finger.state = ContactState.UNSTABLE
 
 
-@given(st.sets(st.integers(0, 62)))
-def test_bits_are_taxels(taxels):
-    assert taxels_of(sum(1 << taxel for taxel in taxels)) == tuple(sorted(taxels))
+@given(st.sets(st.integers(0, 511)), st.integers(512, 600))
+def test_bits_are_taxels(taxels, n_taxels):
+    mask = sum(1 << taxel for taxel in taxels)
+    words = [mask >> 64 * k & (1 << 64) - 1 for k in range(n_mask_words(n_taxels))]
+    assert taxels_of(np.array(words, np.uint64)) == tuple(sorted(taxels))
 
 
 @given(st.sets(st.sampled_from(Fault)))

@@ -33,7 +33,7 @@ def main() -> None:
     finger = np.dtype(
         [
             ("time", "f8"), ("state", "i4"), ("reason", "i4"), ("cause", "i4"), ("faults", "u4"),
-            ("faulty_taxels", "u8"), ("stable_probability", "f8"), ("slip_probability", "f8"),
+            ("faulty_taxels", "u8", (1,)), ("stable_probability", "f8"), ("slip_probability", "f8"),
             ("slip_speed", "f8"), ("slip_distance", "f8"), ("instability", "f8"),
             ("force", "f8", 3),
         ],

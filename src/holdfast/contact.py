@@ -393,10 +393,29 @@ def faults_of(mask: int) -> tuple[Fault, ...]:
     return tuple(fault for bit, fault in enumerate(Fault) if mask >> bit & 1)
 
 
+MAX_TAXELS = 512
+"""Maximum number of taxels of a sensor in a model or a detector: of a mask in the C kernel."""
+
+
+def n_mask_words(n_taxels: int) -> int:
+    """Return how many words of 64 bits a mask of taxels has."""
+    return -(-n_taxels // 64)
+
+
+def taxels_of(words: bytes | npt.NDArray[np.uint64]) -> tuple[int, ...]:
+    """Return the indices of the taxels in a mask: bit i % 64 of word i // 64 is taxel i, from 0.
+
+    Example:
+        >>> taxels_of(np.array([0b101, 1 << 6], dtype=np.uint64))
+        (0, 2, 70)
+    """
+    return _taxels_of(bytes(words))
+
+
 @lru_cache(maxsize=4096)
-def taxels_of(mask: int) -> tuple[int, ...]:
-    """Return the indices, from 0, of the taxels whose bits are set in a mask."""
-    return tuple(taxel for taxel in range(mask.bit_length()) if mask >> taxel & 1)
+def _taxels_of(words: bytes) -> tuple[int, ...]:
+    octets = np.frombuffer(words, np.uint64).astype("<u8").view(np.uint8)
+    return tuple(np.flatnonzero(np.unpackbits(octets, bitorder="little")).tolist())
 
 
 def with_faults(

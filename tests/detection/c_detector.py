@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.contact import CAUSES as KNOWN_CAUSES
-from holdfast.contact import ContactState, Reason, faults_of, taxels_of
+from holdfast.contact import ContactState, Reason, faults_of, n_mask_words, taxels_of
 from holdfast.detection import Detector
 from holdfast.detection.c_header import header_of
 from holdfast.detection.plan import Start
@@ -23,14 +23,14 @@ RING = np.random.default_rng(1).integers(0, 9, size=(30, 30, 3))
 """Readings of samples that come again and again."""
 
 
-def estimate_type(n_fingers, real=ctypes.c_double):
+def estimate_type(n_fingers, n_words=1, real=ctypes.c_double):
     """Return the classes of `holdfast_estimate` for ctypes."""
 
     class FingerEstimate(ctypes.Structure):
         _fields_ = (
             ("time", ctypes.c_double), ("state", ctypes.c_int), ("reason", ctypes.c_int),
             ("cause", ctypes.c_int), ("faults", ctypes.c_uint32),
-            ("faulty_taxels", ctypes.c_uint64), ("stable_probability", real),
+            ("faulty_taxels", ctypes.c_uint64 * n_words), ("stable_probability", real),
             ("slip_probability", real), ("slip_speed", real), ("slip_distance", real),
             ("instability", real), ("force", real * 3),
         )  # fmt: skip
@@ -67,7 +67,8 @@ class CDetector:
         self.bounds = np.cumsum([0, *(sensor.n_taxels for sensor in sensors.values())])
         self.library.holdfast_size.restype = ctypes.c_size_t
         self.memory = ctypes.create_string_buffer(self.library.holdfast_size())
-        self.estimate = estimate_type(len(sensors), self.real)()
+        n_words = n_mask_words(max(sensor.n_taxels for sensor in sensors.values()))
+        self.estimate = estimate_type(len(sensors), n_words, self.real)()
         self.library.holdfast_init(self.memory)
 
     def update(self, samples, time):

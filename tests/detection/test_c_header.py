@@ -17,7 +17,8 @@ from detection.c_detector import (
     compare,
     random_samples,
 )
-from detection.models import HAND, MODELS, TIP, built_in, made, paper, rich
+from detection.detector.build import sensor as tiny
+from detection.models import HAND, MODELS, PATCH, TIP, built_in, made, paper, rich
 from holdfast.contact import ContactState, Fault
 from holdfast.detection import Detector
 from holdfast.errors import ModelError
@@ -151,6 +152,18 @@ def test_readings_without_contact_and_ignored_taxels_give_the_same():
     options = {"in_contact": True, "baselines": zero, "ignore": {"index": [0, 7]}}
     python, c = both(built_in("any"), HAND, 150.0, **options)
     assert run_recording(python, c, recording) > {ContactState.UNKNOWN}
+
+
+def test_a_sensor_of_more_than_64_taxels_gives_the_same():
+    skin = tiny(88, "skin", limits=(0.0, 65_535.0))
+    python, c = both(built_in("any"), {"skin": skin, "pad": PATCH}, 100.0)
+    rng, named = np.random.default_rng(0), set()
+    for k in range(400):
+        skin_sample = np.rint(30_000 + rng.normal(scale=3, size=(88, 3)))
+        skin_sample[87, 2] = np.nan if k > 200 else 30_000
+        samples = {"skin": skin_sample, "pad": skin_sample[:16] + 7}
+        named.add(compare(python, c, samples, k / 100).fingers["skin"].faulty_taxels)
+    assert (87,) in named
 
 
 def run_recording(python, c, recording):

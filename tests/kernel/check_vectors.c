@@ -2,7 +2,8 @@
  *
  *     cc -std=c99 -I src/holdfast/kernel tests/kernel/check_vectors.c -o check -lm && ./check
  *
- * With -DHOLDFAST_VECTORS_FIXED the sizes are macros, as in an exported header; with
+ * With -DHOLDFAST_VECTORS_LINKED the kernel is linked, its files compiled each by itself. With
+ * -DHOLDFAST_VECTORS_FIXED the sizes are macros, as in an exported header; with
  * -DHOLDFAST_SINGLE numbers are of single precision, and only states, reasons and faults
  * are compared. */
 #include "vectors.h"
@@ -81,7 +82,7 @@ static void run(holdfast_detector_memory *d)
             /* Two causes may be nearly equal: there single precision is not compared. */
             check("the cause", k, e->cause, (double)*code++, 6 * IS_SINGLE);
             check("the faults", k, e->faults, (double)*code++, 0);
-            check("the taxels", k, (double)e->faulty_taxels, (double)*code++, 0);
+            check("the taxels", k, (double)e->faulty_taxels[0], (double)*code++, 0);
         }
         if (k % EVERY == 0 && !IS_SINGLE) {
             expected = check_numbers(d, estimates, k, expected);

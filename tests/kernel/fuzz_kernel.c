@@ -63,7 +63,7 @@ static void spoil(input *in, size_t *const *sizes, size_t n)
 
 static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
 {
-    finger->n_taxels = 1 + (size_t)take(in, 1) % 70;
+    finger->n_taxels = 1 + (size_t)take(in, 1) % 70 + (take(in, 1) % 8 ? 0 : 450);
     finger->n_used = (hf_real)finger->n_taxels;
     const bool in_counts = take(in, 1) % 2;
     finger->low = in_counts ? 0 : -HF_INFINITY;

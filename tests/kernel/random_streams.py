@@ -11,8 +11,8 @@ RATES = (20.0, 60.0, 150.0, 500.0, 1000.0)
 
 
 def random_sensor(rng):
-    """Return a sensor of 1 to 70 taxels, flat or not, in counts or in newtons."""
-    n_taxels = int(rng.choice([1, 2, 3, 5, 16, 30, 63, 64, 70]))
+    """Return a sensor of 1 to 130 taxels, flat or not, in counts or in newtons."""
+    n_taxels = int(rng.choice([1, 2, 3, 5, 16, 30, 64, 65, 130]))
     axes = np.linalg.qr(rng.normal(size=(n_taxels, 3, 3)))[0]
     axes[:, :, 0] *= np.linalg.det(axes)[:, None]  # no mirror
     flat = rng.random() < 0.5

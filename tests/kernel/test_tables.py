@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from detection.detector.build import sensor as made
 from holdfast.detection import Tare
 from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.plan import StreamPlan
@@ -109,6 +110,17 @@ class TestCheck:
         place = len(HOLDFAST_FEATURES) + 1
         assert stream_config(plan).features[place]["kind"] == -1
         assert refused(plan, f"features.{place}.of_hand", True) == "of_hand of a padding"
+
+    def test_a_set_holds_512_taxels(self):
+        plan = StreamPlan({"f": made(512)}, {"f": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
+        config = stream_config(plan)
+        _extension.Stream(*packed(config), plan.baseline.tobytes())  # 512
+        config.hand["n_lanes"] = 516
+        config.fingers["n_taxels"], config.fingers["n_used"] = 513, 513.0
+        used = (np.arange(516) < 513).astype(float)
+        wide = config._replace(used=used, rotations=np.zeros(9 * 516), places=np.zeros(3 * 516))
+        with pytest.raises(ValueError, match="first, first_taxel or n_taxels of a finger"):
+            _extension.Stream(*packed(wide), bytes(513 * 24))
 
     def test_normals_are_finite(self, plan):
         normal = (0.0, 1.0, np.inf)

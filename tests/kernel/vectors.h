@@ -9,8 +9,13 @@
 #define HOLDFAST_N_LEVELS 3
 #define HOLDFAST_N_TRACK 13
 #define HOLDFAST_N_TAXELS 9
+#define HOLDFAST_MASK_WORDS 1
 #endif
+#ifdef HOLDFAST_VECTORS_LINKED
+#include "detector.h"
+#else
 #include "holdfast.c"
+#endif
 
 static const holdfast_finger hf_fingers[2] = {
 

@@ -137,7 +137,7 @@ def main():
         given += [number(time), *map(str, present.astype(int)), *map(number, readings.ravel())]
         codes += [str(int(hand[k]))]
         for row in estimates[k]:
-            codes += [str(int(row[name])) for name in CODES]
+            codes += [str(int(np.ravel(row[name])[0])) for name in CODES]
             if k % EVERY == 0:
                 numbers += [number(float(row[name])) for name in NUMBERS]
                 numbers += map(number, row["force"].tolist())
@@ -147,7 +147,8 @@ def main():
         "/* Written by write_vectors.py; do not edit. */\n",
         "#ifdef HOLDFAST_VECTORS_FIXED\n",
         *(f"#define HOLDFAST_{name.upper()} {n}\n" for name, n in made.sizes.items()),
-        '#endif\n#include "holdfast.c"\n\n',
+        '#endif\n#ifdef HOLDFAST_VECTORS_LINKED\n#include "detector.h"\n',
+        '#else\n#include "holdfast.c"\n#endif\n\n',
         re.sub(r"-?\d+\.\d+(e[+-]?\d+)?", r"(hf_real)\g<0>", "\n".join(made.texts)),
         f"\n\nenum {{ N_SAMPLES = {N_SAMPLES}, EVERY = {EVERY} }};\n",
         "\n/* Of each sample: time, present fingers, readings (n_taxels, 3). */\n",

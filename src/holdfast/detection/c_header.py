@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import Fault, Reason
+from holdfast.contact import Fault, Reason, n_mask_words
 from holdfast.detection.kernel_config import model_config, stream_config
 from holdfast.detection.model import Model
 from holdfast.detection.plan import OPEN_HAND, Start, StreamPlan
@@ -60,6 +60,7 @@ class Tables:
         names = stream.hand.dtype.names or ()
         self.sizes = {name: int(stream.hand[name][0]) for name in names if name.startswith("n_")}
         self.sizes["n_taxels"] = len(baseline)
+        self.sizes["mask_words"] = max(n_mask_words(s.n_taxels) for s in plan.sensors.values())
         macros = {f"HOLDFAST_{name.upper()}": n for name, n in self.sizes.items()}
         self.types = types_of(kernel, macros, single=single)
         self.has_baseline = bool(np.any(baseline))

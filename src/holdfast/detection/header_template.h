@@ -130,7 +130,7 @@ static inline bool hf_is_present(const holdfast_finger *finger, const holdfast_r
 static inline void hf_write_unknown(holdfast_estimate *estimate)
 {
     const holdfast_finger_estimate finger = {
-        NAN, HOLDFAST_UNKNOWN, 0, 0, 0, 0, HF_NAN, HF_NAN, HF_NAN, HF_NAN, HF_NAN,
+        NAN, HOLDFAST_UNKNOWN, 0, 0, 0, {0}, HF_NAN, HF_NAN, HF_NAN, HF_NAN, HF_NAN,
         {HF_NAN, HF_NAN, HF_NAN}};
     estimate->time = NAN;
     estimate->state = HOLDFAST_UNKNOWN;

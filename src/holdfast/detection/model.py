@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.contact import MAX_TAXELS
 from holdfast.detection.features import extract
 from holdfast.detection.heads import HEAD_NAMES, Choice, Head, HeadName, Linear
 from holdfast.detection.model_files import decode, encode, read_model, write_model
@@ -29,8 +30,6 @@ MAX_FEATURES = 1024
 """Maximum number of features of a finger."""
 MAX_FINGERS = 256
 """Maximum number of fingers, and of sensors, in a model."""
-MAX_TAXELS = 4096
-"""Maximum number of taxels of a sensor in a model."""
 
 
 class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -10,7 +10,9 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.contact import MAX_TAXELS
 from holdfast.detection.specs import FeatureSpec
+from holdfast.errors import ModelError
 from holdfast.recordings import BASELINES, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
@@ -266,6 +268,9 @@ class StreamPlan:
         rate: samples per second [Hz].
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
         start: with an open hand, or in contact; for a tare by interval, with its baselines.
+
+    Raises:
+        ModelError: a sensor has more than `MAX_TAXELS`.
     """
 
     sensors: Mapping[str, Sensor]
@@ -275,6 +280,14 @@ class StreamPlan:
     rate: float
     ignore: Mapping[str, Sequence[int]] = field(default_factory=dict)
     start: Start = OPEN_HAND
+
+    def __post_init__(self) -> None:
+        for name, sensor in self.sensors.items():
+            if sensor.n_taxels > MAX_TAXELS:
+                raise ModelError(
+                    f"{name}: a sensor of {sensor.n_taxels} taxels given ({sensor.name}); "
+                    f"at most {MAX_TAXELS} expected"
+                )
 
     @property
     def used_tare(self) -> Tare:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from itertools import repeat
 from math import nan
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from holdfast.contact import (
     HandEstimate,
     Reason,
     faults_of,
+    n_mask_words,
     taxels_of,
 )
 from holdfast.errors import require_extras
@@ -26,13 +27,14 @@ from holdfast.kernel import _extension
 from holdfast.kernel.structs import Structs, struct_type
 from holdfast.recordings import Recording
 from holdfast.sensors import taxel_numbers
-from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.sensors.types import Array, Flags
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 STATE_BY_CODE = tuple(ContactState)
 REASON_BY_CODE = tuple(Reason)
+Mask = TypeVar("Mask", int, bytes)
 CAUSE_BY_CODE: tuple[Cause | None, ...] = (None, *CAUSES)
 
 
@@ -90,7 +92,8 @@ class FingerTrace(NamedTuple):
         force: (n, 3) F_tip in the fingertip frame [unit of the readings].
         faults: (n,) bits in the order of `Fault`; `faults_of(bits)` of `holdfast.contact` are the
             faults.
-        faulty_taxels: (n,) bit i is set if the taxel at index i is faulty by itself.
+        faulty_taxels: (n, n_words) bit i % 64 of word i // 64 is set if the taxel at index i is
+            faulty by itself; `taxels_of(words)` of `holdfast.contact` are the indices.
         cause: (n,) codes of the causes while UNSTABLE, or while it slides; 0 for none, of which
             any other is `Cause(code)`.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
@@ -106,7 +109,7 @@ class FingerTrace(NamedTuple):
     instability: Array
     force: Array
     faults: npt.NDArray[np.int32]
-    faulty_taxels: Integers
+    faulty_taxels: npt.NDArray[np.uint64]
     cause: npt.NDArray[np.int8]
     slip_probability: Array | None = None
     slip_speed: Array | None = None
@@ -124,7 +127,10 @@ class FingerTrace(NamedTuple):
         # None instead of a column: the model has no such head.
         given = (self.slip_probability, self.slip_speed, self.slip_distance)
         slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
-        columns = (column[rows].tolist() for column in self[:-3])
+        columns = (
+            column[rows] if column is self.faulty_taxels else column[rows].tolist()
+            for column in self[:-3]
+        )
         return [
             ContactEstimate(
                 time, STATE_BY_CODE[state], REASON_BY_CODE[reason], probability, sigma,
@@ -171,14 +177,14 @@ class Detection:
         def words(codes: npt.NDArray[Any], kind: type[StrEnum]) -> Any:  # noqa: ANN401 (of pandas)
             return pd.Categorical.from_codes(codes, [word.value for word in kind])
 
-        def texts(masks: npt.NDArray[Any], names: Callable[[int], Iterable[object]]) -> list[str]:
-            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks.tolist())}
-            return [known[mask] for mask in masks.tolist()]
+        def texts(masks: Sequence[Mask], names: Callable[[Mask], Iterable[object]]) -> list[str]:
+            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
+            return [known[mask] for mask in masks]
 
         parts = []
         for finger, trace in self.fingers.items():
             # A fault of the whole finger names no taxel, as in `ContactEstimate`.
-            taxels = np.where(trace.faults, trace.faulty_taxels, 0)
+            taxels = np.where(trace.faults[:, None] != 0, trace.faulty_taxels, 0)
             slips = {
                 name: nan if getattr(trace, name) is None else getattr(trace, name)
                 for name in ("slip_probability", "slip_speed", "slip_distance")
@@ -191,8 +197,11 @@ class Detection:
                 "stable_probability": trace.stable_probability,
                 "instability": trace.instability,
                 **{f"force_{axis}": trace.force[:, k] for k, axis in enumerate("xyz")},
-                "faults": texts(trace.faults, faults_of),
-                "faulty_taxels": texts(taxels, lambda mask: taxel_numbers(taxels_of(mask))),
+                "faults": texts(trace.faults.tolist(), faults_of),
+                "faulty_taxels": texts(
+                    [words.tobytes() for words in taxels],
+                    lambda words: taxel_numbers(taxels_of(words)),
+                ),
                 "cause": words(trace.cause - 1, Cause),  # -1, which is no cause, is missing
                 **slips,
                 "hand": words(self.hand[np.searchsorted(self.times, trace.times)], ContactState),
@@ -238,9 +247,13 @@ def detection_of(
     for finger, (_, slip, speed, _) in zip(fingers, rules["heads"]["n_outputs"], strict=True):
         n = recording.modules[finger].n_samples if finger in recording.modules else 0
         if n:
+            # A mask has the words that the sensor needs.
+            n_words = n_mask_words(recording.modules[finger].sensor.n_taxels)
+            shapes = {name: (n, *kind[name].shape) for name in FingerTrace._fields[1:]}
+            shapes["faulty_taxels"] = n, n_words
             columns: dict[str, npt.NDArray[Any]] = {
-                name: np.empty((n, *kind[name].shape), SMALL_TYPES.get(name, kind[name].base))
-                for name in FingerTrace._fields[1:]
+                name: np.empty(shape, SMALL_TYPES.get(name, kind[name].base))
+                for name, shape in shapes.items()
                 if (slip or name != "slip_probability") and (speed or name not in SPEED_FIELDS)
             }
             traces[finger] = FingerTrace(recording.modules[finger].times, **columns)
@@ -256,5 +269,6 @@ def detection_of(
                 ends[finger] = part.stop
                 for name, column in traces[finger]._asdict().items():
                     if column is not None and name != "times":
-                        column[part] = rows[name]
+                        used = column.shape[-1] if name == "faulty_taxels" else None
+                        column[part] = rows[name][..., :used] if used else rows[name]
     return Detection(recording.name, traces, np.concatenate(times), np.concatenate(hand))

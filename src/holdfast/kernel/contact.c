@@ -2,9 +2,7 @@
  *
  * A finger without contact has a small load. What counts as none follows a slow drift, and a skin
  * that is released and relaxes. */
-#include "detector.h"
-
-#include "finger.h"
+#include "decision.h"
 
 /* A touch brings F_a over the threshold of contact in less time than this; a drift does not [s]. */
 #define HF_DRIFT_SECONDS ((hf_real)1)
@@ -29,10 +27,6 @@
 #define HF_UNSTEADY_TO_NOISE ((hf_real)16)
 /* A finger is calm while sigma is at most this many times the sigma of noise alone. */
 #define HF_CALM_RATIO ((hf_real)3)
-
-/* What a force shows. Unsteady: what is left of it is as small as without contact, but it still
- * moves; or a large share of it comes or goes at once. Such a finger closes, opens or is pushed. */
-enum { HF_IN_CONTACT, HF_UNSTEADY, HF_WITHOUT_CONTACT };
 
 /* How the load came over the threshold of contact. */
 enum { HF_NO_EXCESS, HF_TOUCH, HF_DRIFT };
@@ -152,7 +146,7 @@ static void hf_update_rest(const hf_finger *f, holdfast_decision *d)
 }
 
 /* Let the force without contact follow slowly. */
-static void hf_follow(const hf_finger *f, holdfast_decision *d)
+HF_SHARED void hf_follow(const hf_finger *f, holdfast_decision *d)
 {
     /* rest(k) = rest(k-1) + (T / tau) (F_tip(k) - rest(k-1)). */
     const hf_real share = hf_min(1, f->hand->period / HF_FOLLOW_SECONDS);
@@ -196,7 +190,7 @@ static bool hf_has_drifted(
 }
 
 /* Return what the force of a finger with features shows. Report a drift of its tare as a fault. */
-static int hf_find_contact(
+HF_SHARED int hf_find_contact(
     const hf_finger *f, const holdfast_rule *rule, holdfast_decision *d, bool zero_unknown,
     double time)
 {

@@ -1,7 +1,5 @@
 /* The decision about a finger: from its probability of stability to the state that is reported. */
-#include "detector.h"
-
-#include "finger.h"
+#include "decision.h"
 
 /* Time over which neighbouring samples are one piece of evidence [s]: samples that come faster
  * count less in the forward filter, so that it does the same at any rate. */
@@ -23,7 +21,7 @@ static hf_real hf_bounded_log_odds(hf_real probability)
  *
  * A sample counts for or against stability by how far its probability is from the threshold, so
  * that the filter never decides against samples that are all on one side. */
-static hf_real hf_filter(
+HF_SHARED hf_real hf_filter(
     holdfast_decision *d, hf_real probability, hf_real threshold, hf_real switching, double time)
 {
     /* e = logit p - logit p_0. Prediction over dt: the chance of each state moves towards 1/2,
@@ -43,8 +41,8 @@ static hf_real hf_filter(
 }
 
 /* Return STABLE from the threshold on. Hysteresis moves it away from the reported state. */
-static int32_t hf_classify(
-    hf_real probability, hf_real threshold, hf_real hysteresis, int32_t reported)
+HF_SHARED int32_t
+hf_classify(hf_real probability, hf_real threshold, hf_real hysteresis, int32_t reported)
 {
     if (reported == HOLDFAST_STABLE) {
         threshold -= hysteresis;
@@ -57,8 +55,8 @@ static int32_t hf_classify(
 /* Return UNSTABLE while it is held, else the state of a finger in contact.
  *
  * A contact that has just begun closes: its first sample counts as unstable for the hold time. */
-static int32_t hf_hold(
-    holdfast_decision *d, int32_t state, hf_real hold, double time, hf_real period)
+HF_SHARED int32_t
+hf_hold(holdfast_decision *d, int32_t state, hf_real hold, double time, hf_real period)
 {
     if (state == HOLDFAST_UNSTABLE || d->candidate == HOLDFAST_NO_CONTACT) {
         d->last_unstable = time;
@@ -67,7 +65,7 @@ static int32_t hf_hold(
 }
 
 /* Report the state if it has lasted long enough, or if the reported state is UNKNOWN. */
-static void hf_debounce(
+HF_SHARED void hf_debounce(
     holdfast_decision *d, int32_t state, hf_real min_duration, double time, hf_real period)
 {
     /* Reported once t - t_since + T / 2 >= min_duration: half a period allows for rounding. */
@@ -85,7 +83,7 @@ static void hf_debounce(
  *
  * A fault that leaves a force is reported when it has lasted; the probability is kept until then.
  */
-static void hf_decide_unready(
+HF_SHARED void hf_decide_unready(
     const holdfast_model *model, const hf_finger *f, const holdfast_rule *rule,
     holdfast_decision *d, bool is_present, double time)
 {
@@ -129,7 +127,7 @@ static int32_t hf_decide_contact(
 }
 
 /* Decide the state of a finger from its features, and report it when it has lasted. */
-static void hf_decide(
+HF_SHARED void hf_decide(
     const holdfast_model *model, const hf_finger *f, const holdfast_rule *rule,
     holdfast_decision *d, const hf_real *phi, int contact, double time)
 {

@@ -1,7 +1,5 @@
 /* The detector: a sample of a hand through the kernel and the decisions; tables and memory. */
-#include "detector.h"
-
-#include "finger.h"
+#include "decision.h"
 
 static int32_t hf_hand_state(const holdfast_model *model, const holdfast_detector_memory *d)
 {
@@ -49,7 +47,7 @@ static void hf_fill_estimate(
         out->cause = HOLDFAST_CAUSE_SLIP;
     }
     out->faults = f->values->faults;
-    out->faulty_taxels = f->values->taxels;
+    memcpy(out->faulty_taxels, f->values->taxels.words, sizeof out->faulty_taxels);
     out->stable_probability = d->probability;
     out->slip_probability = d->slip_probability;
     out->slip_speed = d->speed;
@@ -85,7 +83,7 @@ HF_API int32_t holdfast_detect(
     return d->state;
 }
 
-static void hf_start_decision(holdfast_decision *d)
+HF_SHARED void hf_start_decision(holdfast_decision *d)
 {
     memset(d, 0, sizeof *d); /* UNKNOWN, no excess, no cause */
     d->probability = d->smoothed = d->filtered = HF_NAN;

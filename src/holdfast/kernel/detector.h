@@ -153,12 +153,13 @@ enum {
 
 /* Estimate of a finger. Numbers that the model does not give are NaN. */
 typedef struct {
-    double time;                /* of its last sample [s] */
-    int32_t state;              /* HOLDFAST_UNKNOWN, ... */
-    int32_t reason;             /* HOLDFAST_TARE, ...: why it is UNKNOWN; HOLDFAST_LOAD, ... */
-    int32_t cause;              /* HOLDFAST_CAUSE_CLOSING, ... */
-    uint32_t faults;            /* HOLDFAST_NOT_FINITE, ... */
-    uint64_t faulty_taxels;     /* bit i: taxel i of the finger is faulty by itself */
+    double time;     /* of its last sample [s] */
+    int32_t state;   /* HOLDFAST_UNKNOWN, ... */
+    int32_t reason;  /* HOLDFAST_TARE, ...: why it is UNKNOWN; HOLDFAST_LOAD, ... */
+    int32_t cause;   /* HOLDFAST_CAUSE_CLOSING, ... */
+    uint32_t faults; /* HOLDFAST_NOT_FINITE, ... */
+    /* Bit i % 64 of word i / 64: taxel i of the finger is faulty by itself. */
+    uint64_t faulty_taxels[HOLDFAST_MASK_WORDS];
     hf_real stable_probability; /* NaN while UNKNOWN */
     hf_real slip_probability;
     hf_real slip_speed;    /* [mm/s] */

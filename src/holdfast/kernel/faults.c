@@ -32,13 +32,8 @@
 /* Least ratio of the mean squares of second and first differences in noise. It is 2 for
  * independent steps, 3 for white noise, 4 for a value that jumps up and down, less for motion. */
 #define HF_WHITE_RATIO ((hf_real)2.5)
-/* Least share of a finger's second differences in one noisy taxel: a touch spreads over the skin
- * to neighbouring taxels. */
-#define HF_LONE_SHARE ((hf_real)0.9)
 /* A taxel is noisy when it exceeds its least possible noise by this factor. */
 #define HF_LOUD_RATIO ((hf_real)100)
-/* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
-#define HF_MIN_TAXELS ((hf_real)4)
 /* Weights of the axes in the sum of the readings, sqrt(2) / 1.5 and sqrt(3) / 1.6: about 1, but not
  * rational. So whole counts have the same sum only if the sum of each axis is the same. */
 #define HF_WEIGHT_Y (HF_SQRT_2 / (hf_real)1.5)
@@ -46,18 +41,8 @@
 /* A pull for this long means that the tare was taken under load: nothing pulls a skin [s]. */
 #define HF_LOADED_SECONDS ((hf_real)0.25)
 
-/* Faults of a finger whose samples no window may hold, though they have a force. */
-enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };
-
-/* The readings of a finger in short. */
-typedef struct {
-    hf_real total; /* weighted sum; finite if all readings are */
-    hf_real least;
-    hf_real most;
-} hf_scan;
-
 /* Scan the readings of a finger (3, n). */
-static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
+HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 {
     const size_t n = f->n;
     hf_sum sum_x, sum_y, sum_z, minus_least, most;
@@ -90,42 +75,42 @@ static hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
     return scan;
 }
 
-/* Return the bits of the taxels with a reading that is not strictly between low and high. */
-static uint64_t hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
+/* Return the taxels with a reading that is not strictly between low and high. */
+HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high)
 {
-    uint64_t bits = 0;
+    holdfast_taxel_set outside = {{0}};
     for (size_t axis = 0; axis < 3; ++axis) {
         for (size_t i = 0; i < f->n_taxels; ++i) {
             const hf_real reading = f->readings[axis * f->n + i];
             if (!(low < reading && reading < high) && f->used[i] > 0) {
-                bits |= hf_bit(i);
+                hf_include(&outside, i);
             }
         }
     }
-    return bits;
+    return outside;
 }
 
-/* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return the bits of
- * these taxels. At least one reading of the finger is not valid. */
-static uint64_t hf_find_invalid(const hf_finger *f, uint32_t *faults)
+/* Add NOT_FINITE and OUT_OF_RANGE to some faults, as far as some taxel has them. Return these
+ * taxels. At least one reading of the finger is not valid. */
+HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults)
 {
-    const uint64_t infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
-    const uint64_t bits = hf_taxels_outside(
+    const holdfast_taxel_set infinite = hf_taxels_outside(f, -HF_INFINITY, HF_INFINITY);
+    const holdfast_taxel_set invalid = hf_taxels_outside(
         f, hf_nextafter(f->finger->low, -HF_INFINITY), hf_nextafter(f->finger->high, HF_INFINITY));
-    if (infinite) {
+    if (!hf_is_empty(f, &infinite)) {
         *faults |= HOLDFAST_NOT_FINITE;
     }
-    if (bits != infinite) {
+    if (!hf_are_equal(f, &invalid, &infinite)) {
         *faults |= HOLDFAST_OUT_OF_RANGE;
     }
-    return bits;
+    return invalid;
 }
 
 /* Return whether the readings of a finger stopped changing after they had changed.
  *
  * A sensor with a dead band, or with less noise than a step of its readings, rests while nothing
  * moves it. */
-static bool hf_is_stuck(const hf_finger *f)
+HF_SHARED bool hf_is_stuck(const hf_finger *f)
 {
     /* Stuck: more than half of the steps before the rest changed a reading, 0.5 s of changes at
      * least, and the rest lasts max(0.5 s, 10 times the longest rest before). */
@@ -138,7 +123,7 @@ static bool hf_is_stuck(const hf_finger *f)
 }
 
 /* Return whether the normal readings add up to a pull, well above noise, for a long time. */
-static bool hf_is_pulled(const hf_finger *f, hf_real normal)
+HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal)
 {
     /* Pulled: sum_i z_i < -max(20 noise, 0.1 max F_a), for 0.25 s. Noise alone never reaches 20
      * deviations, and an elastomer that creeps falls by less than a tenth. */
@@ -159,7 +144,7 @@ static bool hf_differ(const hf_real *readings, const hf_real *previous, size_t n
 }
 
 /* Return false for zeros: a sensor with a dead band jumps to and from zero without noise. */
-static bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
+HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i)
 {
     return readings[i] != 0 || readings[n + i] != 0 || readings[2 * n + i] != 0;
 }
@@ -361,7 +346,7 @@ static void hf_find_still_taxels(const hf_finger *f)
         return;
     }
     /* A taxel at a limit of its range is saturated, not stuck. */
-    const uint64_t at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
+    const holdfast_taxel_set at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const int64_t still = s->n_changes - taxel->changed_at;
@@ -378,10 +363,10 @@ static void hf_find_still_taxels(const hf_finger *f)
         }
         if (taxel->n_changed == 0) {
             s->taxel_faults |= HOLDFAST_DEAD;
-            s->faulty_taxels |= hf_bit(i);
-        } else if ((at_limit & hf_bit(i)) == 0) {
+            hf_include(&s->faulty_taxels, i);
+        } else if (!hf_has(&at_limit, i)) {
             s->taxel_faults |= HOLDFAST_STUCK;
-            s->faulty_taxels |= hf_bit(i);
+            hf_include(&s->faulty_taxels, i);
         }
     }
 }
@@ -405,8 +390,8 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
     const hf_real loud = HF_LOUD_RATIO * quiet;
     if (second_power > HF_WHITE_RATIO * first_power && second_power > 6 * (loud * loud)) {
         s->taxel_faults |= HOLDFAST_NOISY;
-        s->noisy_taxels = hf_bit(loudest);
-        s->faulty_taxels |= s->noisy_taxels;
+        hf_include(&s->noisy_taxels, loudest);
+        hf_include(&s->faulty_taxels, loudest);
     }
 }
 
@@ -425,13 +410,13 @@ static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
     return (hf_real)taxel->n_same[axis] >= limit;
 }
 
-/* Return the bits of the magnetometers of which an axis is stuck, while that of the others moves.
+/* Find the magnetometers of which an axis is stuck, while that of the others moves.
  *
  * Whole counts with little noise repeat, so an axis is compared with its own past. */
-static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
+static void hf_find_stuck_axis(const hf_finger *f, size_t axis)
 {
     const hf_real *const readings = f->readings + axis * f->n;
-    const uint64_t stuck = f->state->stuck_axes[axis];
+    holdfast_taxel_set *const stuck = &f->state->stuck_axes[axis];
     const int32_t least = (int32_t)(HF_DEAD_SECONDS / HF_COMPARED_SECONDS);
     bool is_any_same = false;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -441,15 +426,19 @@ static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
             is_any_same |= taxel->n_same[axis] >= least && f->used[i] > 0;
             continue;
         }
-        if (taxel->n_same[axis] > taxel->longest_same[axis] && !(stuck & hf_bit(i))) {
+        if (taxel->n_same[axis] > taxel->longest_same[axis] && !hf_has(stuck, i)) {
             taxel->longest_same[axis] = taxel->n_same[axis];
         }
         taxel->compared[axis] = readings[i];
         taxel->n_same[axis] = 0;
         taxel->n_differed[axis] += 1;
     }
+    if (f->state->has_stuck_axis[axis]) {
+        hf_clear(stuck);
+        f->state->has_stuck_axis[axis] = false;
+    }
     if (!is_any_same) {
-        return 0;
+        return;
     }
     hf_real n_moving = 0;
     int32_t longest = 0; /* of those that move */
@@ -461,14 +450,13 @@ static uint64_t hf_find_stuck_axis(const hf_finger *f, size_t axis)
             longest = taxel->longest_same[axis] > longest ? taxel->longest_same[axis] : longest;
         }
     }
-    uint64_t bits = 0;
     for (size_t i = 0; n_moving >= HF_MOVING_SHARE * f->finger->n_used && i < f->n_taxels; ++i) {
         const bool at_limit = readings[i] <= f->finger->low || readings[i] >= f->finger->high;
         if (f->used[i] > 0 && !at_limit && hf_is_same(&f->taxels[i], axis, longest)) {
-            bits |= hf_bit(i);
+            hf_include(stuck, i);
+            f->state->has_stuck_axis[axis] = true;
         }
     }
-    return bits;
 }
 
 /* Find the faulty taxels of a finger at a sample that changed a reading. */
@@ -485,12 +473,20 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
         const int64_t interval = turns > 1 ? (int64_t)lrint(turns) : 1;
         if (s->n_changes % interval == 0) {
             const size_t axis = (size_t)(s->n_changes / interval % 3);
-            s->stuck_axes[axis] = hf_find_stuck_axis(f, axis);
+            hf_find_stuck_axis(f, axis);
         }
     }
-    s->faulty_taxels = s->stuck_axes[0] | s->stuck_axes[1] | s->stuck_axes[2];
-    s->taxel_faults = s->faulty_taxels ? HOLDFAST_STUCK : 0;
-    s->noisy_taxels = 0;
+    if (s->taxel_faults) { /* of the last sample */
+        hf_clear(&s->faulty_taxels);
+        hf_clear(&s->noisy_taxels);
+        s->taxel_faults = 0;
+    }
+    for (size_t axis = 0; axis < 3; ++axis) {
+        if (s->has_stuck_axis[axis]) {
+            hf_unite(f, &s->faulty_taxels, &s->stuck_axes[axis]);
+            s->taxel_faults = HOLDFAST_STUCK;
+        }
+    }
     if (changes.any_still) {
         hf_find_still_taxels(f);
     }
@@ -500,7 +496,7 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
 }
 
 /* Count a valid sample of a finger, and compare it with the one before. */
-static void hf_track_changes(const hf_finger *f, double time, bool after_gap)
+HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap)
 {
     holdfast_finger_memory *const s = f->state;
     if (s->n_seen == 0) {

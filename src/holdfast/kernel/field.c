@@ -55,7 +55,7 @@ typedef struct {
 } hf_common;
 
 /* Return what the taxels that are not left out have in common. */
-static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
+static hf_common hf_find_common(const hf_finger *f, const holdfast_taxel_set *left_out)
 {
     /* h_i = f_i - b_i: sum h_i, sum R_i h_i, sum |h_i|^2. */
     const size_t n = f->n;
@@ -88,7 +88,7 @@ static hf_common hf_find_common(const hf_finger *f, uint64_t left_out)
     }
     hf_common common = {f->finger->n_used, {0, 0, 0, 0, 0, 0}, false, 0};
     for (size_t i = 0; left_out && i < f->n_taxels; ++i) {
-        if ((left_out & hf_bit(i)) && f->used[i] > 0) {
+        if (hf_has(left_out, i) && f->used[i] > 0) {
             hf_real h[3];
             for (size_t axis = 0; axis < 3; ++axis) {
                 h[axis] = f->readings[axis * n + i] - f->baseline[axis * n + i];
@@ -272,8 +272,8 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
 
 /* Take the field out of the readings of a finger. Return its faults.
  *
- * left_out: bits of the taxels that do not count. */
-static uint32_t hf_take_out_field(const hf_finger *f, uint64_t left_out)
+ * left_out: the taxels that do not count; NULL for none. */
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out)
 {
     holdfast_finger_memory *const s = f->state;
     if (!(f->finger->max_field > 0) || isnan(s->noise)) {

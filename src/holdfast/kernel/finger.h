@@ -3,6 +3,9 @@
 #define HF_FINGER_H
 
 #include "kernel.h"
+#include "lanes.h"
+
+#define HF_SQRT_2 ((hf_real)1.4142135623730951)
 
 /* A step in time of more sample periods is a gap, as in recordings (GAP_PERIODS). The part over 3
  * allows for rounding. */
@@ -14,7 +17,21 @@
  * the taxels is a slip, a larger one no stronger sign of it. */
 #define HF_MAX_DEVIATION ((hf_real)5)
 
-#define HF_SQRT_2 ((hf_real)1.4142135623730951)
+/* Least share of a finger's second differences in one noisy taxel: a touch spreads over the skin
+ * to neighbouring taxels. */
+#define HF_LONE_SHARE ((hf_real)0.9)
+/* Taxels from which one may count as noisy; of fewer, one may be touched alone. */
+#define HF_MIN_TAXELS ((hf_real)4)
+/* Time constant with which the largest load so far is forgotten [s]. */
+#define HF_LOAD_DECAY_SECONDS ((hf_real)5)
+/* Noise in the denominator: changes of a load below this many times its noise count less. It is
+ * also the least load of a grip (contact.c). */
+#define HF_NOISE_WEIGHT ((hf_real)100)
+/* Share of the largest load that a released skin may still show. */
+#define HF_RELEASED_SHARE ((hf_real)0.08)
+
+/* Faults of a finger whose samples no window may hold, though they have a force. */
+enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };
 
 /* One finger: its constants, and its part of the memory. Lanes of taxels count from its first. */
 typedef struct {
@@ -58,22 +75,75 @@ static inline hf_real *hf_forces_at(const hf_finger *f, size_t place)
     return f->taxel_forces + place * 3 * HF_N_LANES(f->hand);
 }
 
-/* The second number if it is larger, else the first: NaN stays only if it is the first. */
-static inline hf_real hf_max(hf_real a, hf_real b)
+/* Return the words of a set that a finger needs. */
+static inline size_t hf_n_words(const hf_finger *f)
 {
-    return b > a ? b : a;
+    return HOLDFAST_MASK_WORDS > 1 ? (f->n_taxels + 63) / 64 : 1;
 }
 
-/* The second number if it is smaller, else the first; NaN as above. */
-static inline hf_real hf_min(hf_real a, hf_real b)
+static inline bool hf_has(const holdfast_taxel_set *set, size_t taxel)
 {
-    return b < a ? b : a;
+    return set->words[taxel / 64] >> taxel % 64 & 1;
 }
 
-/* Return the bit of a taxel in a mask; 0 for a taxel that the mask cannot hold. */
-static inline uint64_t hf_bit(size_t taxel)
+static inline void hf_include(holdfast_taxel_set *set, size_t taxel)
 {
-    return taxel < HF_N_MASK_BITS ? (uint64_t)1 << taxel : 0;
+    set->words[taxel / 64] |= (uint64_t)1 << taxel % 64;
+}
+
+static inline void hf_clear(holdfast_taxel_set *set)
+{
+    const holdfast_taxel_set none = {{0}};
+    *set = none;
+}
+
+/* Add the taxels of another set. */
+static inline void hf_unite(
+    const hf_finger *f, holdfast_taxel_set *set, const holdfast_taxel_set *other)
+{
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        set->words[k] |= other->words[k];
+    }
+}
+
+/* Remove the taxels of another set. */
+static inline void hf_exclude(
+    const hf_finger *f, holdfast_taxel_set *set, const holdfast_taxel_set *other)
+{
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        set->words[k] &= ~other->words[k];
+    }
+}
+
+static inline bool hf_is_empty(const hf_finger *f, const holdfast_taxel_set *set)
+{
+    uint64_t any = 0;
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        any |= set->words[k];
+    }
+    return any == 0;
+}
+
+static inline bool hf_are_equal(
+    const hf_finger *f, const holdfast_taxel_set *a, const holdfast_taxel_set *b)
+{
+    uint64_t differences = 0;
+    for (size_t k = 0; k < hf_n_words(f); ++k) {
+        differences |= a->words[k] ^ b->words[k];
+    }
+    return differences == 0;
+}
+
+/* Return the row of a ring that lies n rows before another; faster than a remainder. */
+static inline size_t hf_row_before(size_t row, size_t n, size_t length)
+{
+    return row >= n ? row - n : row + length - n;
+}
+
+/* Return the force in the ring of the history that lies `back` samples before the newest. */
+static inline const hf_real *hf_history(const hf_finger *f, size_t back)
+{
+    return f->history + hf_row_before(f->state->row, back, HF_N_HISTORY(f->hand)) * HF_N_COMPONENTS;
 }
 
 static inline void hf_fill(hf_real *values, size_t n, hf_real value)
@@ -94,6 +164,112 @@ static inline hf_real hf_dot(const hf_real a[3], const hf_real b[3])
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
-#include "lanes.h"
+#ifdef __GNUC__
+#define HF_APART __attribute__((noinline))
+#else
+#define HF_APART
+#endif
+
+/* Functions of one file that others call. Each is explained where it is defined. */
+
+/* Sums over the taxels at a sample. */
+typedef struct {
+    hf_real force[3];         /* F_tip */
+    hf_real normal;           /* sum of the normal readings: z in the taxel frames */
+    hf_real weight;           /* sum p_i */
+    hf_real pressure_squares; /* sum p_i^2 */
+    hf_real squares;          /* sum |h_i|^2 */
+    hf_real moved;            /* sum of the squared steps of the taxels */
+} hf_taxel_sums;
+
+/* Squared motion of the taxels against their mean, and its part along the normal. */
+typedef struct {
+    hf_real moved;
+    hf_real pressed;
+} hf_residual;
+
+/* Three samples of a second difference: a g(k) - 2 g(k-s) + c g(k-2s). */
+typedef struct {
+    size_t now; /* places in the ring */
+    size_t before;
+    size_t first;
+    hf_real newest; /* weight a; 1 at even times */
+    hf_real oldest; /* weight c; 1 at even times */
+} hf_second;
+
+/* Sums over the second differences d_i of the taxels. */
+typedef struct {
+    hf_real squares;     /* sum |d_i|^2 */
+    hf_real shared;      /* sum p_i |d_i|^2 */
+    hf_real along;       /* sum p_i (d_i . n)^2 */
+    hf_real weighted[3]; /* sum p_i d_i */
+    hf_real top;         /* largest |d_i|^2 of the taxels with p_i > mean p; 0 without any */
+} hf_second_sums;
+
+/* taxels.c */
+HF_SHARED hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3]);
+HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t before);
+HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3]);
+HF_SHARED hf_residual
+hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3]);
+HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at);
+HF_SHARED hf_real hf_risen(const hf_finger *f, size_t now);
+
+/* Mean and spread of a window. */
+typedef struct {
+    hf_real m;        /* equation 1 */
+    hf_real variance; /* the square of sigma, equation 2 */
+} hf_moments;
+
+/* window.c */
+HF_SHARED hf_moments hf_newest_moments(const hf_finger *f, size_t channel, size_t window);
+HF_SHARED hf_real hf_noise_sigma(hf_real noise, size_t window);
+HF_SHARED void hf_append_force(const hf_finger *f, const hf_real force[3]);
+
+/* The readings of a finger in short. */
+typedef struct {
+    hf_real total; /* weighted sum; finite if all readings are */
+    hf_real least;
+    hf_real most;
+} hf_scan;
+
+/* faults.c */
+HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings);
+HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high);
+HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults);
+HF_SHARED bool hf_is_stuck(const hf_finger *f);
+HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
+HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
+HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
+
+/* untrue.c */
+HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
+HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan);
+
+/* tare.c */
+HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
+
+/* field.c */
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out);
+
+/* masks.c */
+HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit);
+HF_SHARED void hf_hold_lost(const hf_finger *f);
+HF_SHARED void hf_lose_taxels(
+    const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid);
+HF_SHARED bool hf_replace_invalid(const hf_finger *f, const holdfast_taxel_set *invalid);
+HF_SHARED bool hf_mask_taxels(const hf_finger *f, const holdfast_taxel_set *faulty, double time);
+
+/* motion.c. Not inline: gcc computes them 4 % slower as a part of their caller. */
+HF_SHARED HF_APART hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3]);
+HF_SHARED HF_APART void hf_update_motion(const hf_finger *f, double time);
+
+/* stream.c */
+HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index);
+HF_SHARED void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes);
+HF_SHARED void hf_clear_values(holdfast_values *values);
+
+/* tables.c */
+HF_SHARED bool hf_are_finite(const hf_real *values, size_t n);
 
 #endif

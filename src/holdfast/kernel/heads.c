@@ -1,7 +1,5 @@
 /* Heads: linear functions of features and of their squares, and what heads make of them. */
-#include "detector.h"
-
-#include "finger.h"
+#include "decision.h"
 
 /* Return output k of a head, without squares: w_k0 + sum_j w_kj phi_j, in the order of j. */
 static hf_real hf_linear(
@@ -16,7 +14,8 @@ static hf_real hf_linear(
 }
 
 /* Return the output of a head that has one, with its squares. */
-static hf_real hf_head_value(const holdfast_head *head, const hf_real *weights, const hf_real *phi)
+HF_SHARED hf_real
+hf_head_value(const holdfast_head *head, const hf_real *weights, const hf_real *phi)
 {
     hf_real z = hf_linear(head, weights, 0, phi);
     if (head->has_squares) {
@@ -31,13 +30,13 @@ static hf_real hf_head_value(const holdfast_head *head, const hf_real *weights, 
     return z;
 }
 
-static hf_real hf_probability(hf_real log_odds)
+HF_SHARED hf_real hf_probability(hf_real log_odds)
 {
     return 1 / (1 + hf_exp(-log_odds));
 }
 
 /* Add the outputs of a sample to the sums. Return the cause with the largest sum. */
-static int32_t hf_add_scores(
+HF_SHARED int32_t hf_add_scores(
     const holdfast_head *head, const hf_real *weights, const hf_real *phi, hf_real *scores)
 {
     size_t best = 0;
@@ -50,7 +49,7 @@ static int32_t hf_add_scores(
     return head->causes[best];
 }
 
-static void hf_forget_cause(holdfast_decision *d)
+HF_SHARED void hf_forget_cause(holdfast_decision *d)
 {
     d->cause = HOLDFAST_NO_CAUSE;
     hf_fill(d->scores, HOLDFAST_N_CAUSES, 0);
@@ -58,13 +57,13 @@ static void hf_forget_cause(holdfast_decision *d)
 
 /* Return whether a state is held: half a period of tolerance, so that the rounding of times does
  * not move the end. False while `last` is NaN. */
-static bool hf_is_held(double time, double last, hf_real hold, hf_real period)
+HF_SHARED bool hf_is_held(double time, double last, hf_real hold, hf_real period)
 {
     return (hf_real)(time - last) + period / 2 < hold;
 }
 
 /* Decide whether a finger slides, from the log odds z of its last sample. */
-static void hf_decide_slip(
+HF_SHARED void hf_decide_slip(
     const holdfast_head *head, holdfast_decision *d, hf_real z, double time, hf_real period)
 {
     /* s(k) = s(k-1) + gain (z(k) - s(k-1)), p = 1 / (1 + exp(-s)). */
@@ -82,7 +81,7 @@ static void hf_decide_slip(
 }
 
 /* Report speed and distance of the slip of a finger; both are 0 while it does not slide. */
-static void hf_follow_slip(
+HF_SHARED void hf_follow_slip(
     const holdfast_head *head, const hf_real *weights, const hf_real *phi, holdfast_decision *d,
     double time, hf_real period)
 {
@@ -104,7 +103,7 @@ static void hf_follow_slip(
 
 /* Report no slip, with a probability, speed and distance of 0 without contact, or NaN without an
  * estimate. */
-static void hf_end_slip(const holdfast_rule *rule, holdfast_decision *d, hf_real probability)
+HF_SHARED void hf_end_slip(const holdfast_rule *rule, holdfast_decision *d, hf_real probability)
 {
     if (rule->heads[HOLDFAST_HEAD_SLIP].n_outputs > 0) {
         d->slips = false;

@@ -1,5 +1,9 @@
 /* The kernel as one source file: its functions are static, and compilers see all of them. An
  * exported header joins the same files in this order. */
+#ifndef HF_SHARED
+#define HF_SHARED static
+#endif
+
 #include "kernel.h"
 
 #include "finger.h"

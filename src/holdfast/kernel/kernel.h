@@ -106,6 +106,12 @@ typedef double hf_real;
  * multiple of it. */
 enum { HF_LANES = 4 };
 
+/* Words of a set of the taxels of a finger: for 512 taxels, or in an exported header for those of
+ * its largest finger. */
+#ifndef HOLDFAST_MASK_WORDS
+#define HOLDFAST_MASK_WORDS 8
+#endif
+
 /* Why a finger has no features at a sample. */
 enum {
     HOLDFAST_READY = 0,   /* it has features */
@@ -182,10 +188,10 @@ enum {
 };
 
 enum {
-    HF_N_RING_SUMS = 128,  /* kept sums of samples: two of the longest periods (untrue.c) */
-    HF_N_SUMS = 3,         /* of a block of pairs: P, D and S (window.c) */
-    HF_N_COMPONENTS = 4,   /* of the history: F_a, F_x, F_y, F_z */
-    HF_N_MASK_BITS = 63,   /* taxels that a mask can hold: in Python it is an int64 */
+    HF_N_RING_SUMS = 128, /* kept sums of samples: two of the longest periods (untrue.c) */
+    HF_N_SUMS = 3,        /* of a block of pairs: P, D and S (window.c) */
+    HF_N_COMPONENTS = 4,  /* of the history: F_a, F_x, F_y, F_z */
+    HF_MAX_FINGER_TAXELS = 64 * HOLDFAST_MASK_WORDS,
     HF_MAX_TAXELS = 65536, /* of a hand: bounds all sizes, so that no product overflows */
     HF_MAX_SAMPLES = 1048576,
     HF_MAX_FEATURES = 4096
@@ -263,6 +269,11 @@ typedef struct {
                                          finger R_00 of all lanes, R_01, ...; 0 of ignored taxels */
     const hf_real *places;            /* (3 n_lanes) from the centroid, in radii of the patch */
 } holdfast_hand;
+
+/* A set of taxels of a finger: bit i % 64 of word i / 64 is taxel i. Other bits are 0. */
+typedef struct {
+    uint64_t words[HOLDFAST_MASK_WORDS];
+} holdfast_taxel_set;
 
 /* Changes of a taxel, to find whether it is faulty (faults.c). */
 typedef struct {
@@ -346,24 +357,26 @@ typedef struct {
     hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
-    int64_t n_unchanged;    /* samples since the readings last changed */
-    int64_t n_changes;      /* samples that changed the readings */
-    int64_t longest_rest;   /* most samples without a change, if long and not by a fault */
-    uint32_t taxel_faults;  /* faults of single taxels at the last sample that changed a reading */
-    uint64_t faulty_taxels; /* bits of those taxels */
-    uint64_t noisy_taxels;  /* bits of the noisy ones among them */
-    uint64_t stuck_axes[3]; /* bits of the magnetometers of which this axis does not change */
+    int64_t n_unchanged;   /* samples since the readings last changed */
+    int64_t n_changes;     /* samples that changed the readings */
+    int64_t longest_rest;  /* most samples without a change, if long and not by a fault */
+    uint32_t taxel_faults; /* faults of single taxels at the last sample that changed a reading */
+    holdfast_taxel_set faulty_taxels; /* those taxels */
+    holdfast_taxel_set noisy_taxels;  /* the noisy ones among them */
+    holdfast_taxel_set stuck_axes[3]; /* magnetometers of which this axis does not change */
+    bool has_stuck_axis[3];           /* there are some */
     /* Taxels that are left out (masks.c). */
-    int64_t n_refused;    /* successive samples of the tare with a reading that is not valid */
-    uint64_t lost;        /* bits of the taxels that have no tare */
-    uint32_t lost_faults; /* their faults */
-    uint64_t masked;      /* bits of the taxels that are left out */
-    bool too_many;        /* the others carry too little of the load */
-    bool load_known;      /* the load was known when the mask last changed */
-    bool unloaded;        /* this load has gone */
-    bool fading;          /* the value of a taxel that came back still fades */
-    hf_real fill_squares; /* sum of the squares of last_healthy, of the healthy taxels */
-    hf_real fill_ratio;   /* load of the healthy taxels, beside that when the mask changed */
+    int64_t n_refused;         /* successive samples of the tare with a reading that is not valid */
+    holdfast_taxel_set lost;   /* taxels that have no tare */
+    uint32_t lost_faults;      /* their faults; 0 without any */
+    holdfast_taxel_set masked; /* taxels that are left out */
+    bool has_masked;           /* there are some */
+    bool too_many;             /* the others carry too little of the load */
+    bool load_known;           /* the load was known when the mask last changed */
+    bool unloaded;             /* this load has gone */
+    bool fading;               /* the value of a taxel that came back still fades */
+    hf_real fill_squares;      /* sum of the squares of last_healthy, of the healthy taxels */
+    hf_real fill_ratio;        /* load of the healthy taxels, beside that when the mask changed */
     /* Magnetic field that all taxels read (field.c). */
     hf_real field[3];       /* that is taken out of all readings */
     hf_real still_field[3]; /* the same, when the readings did not move together last */
@@ -379,25 +392,25 @@ typedef struct {
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
     /* Samples that cannot be true (untrue.c). */
-    uint64_t jumped;      /* bits of the taxels that were refused as a jump at the last sample */
-    hf_real rest_sum;     /* weighted sum of the readings at rest, see hf_scan; NaN before */
-    uint64_t n_valid;     /* samples whose readings are all valid, or were replaced */
-    uint64_t ring_period; /* of the ring of samples that is followed; 0 without one */
-    uint64_t ring_length; /* successive samples with the sum of that a period before */
-    uint64_t ring_age;    /* samples since the ring is followed */
-    bool ring_varies;     /* enough readings and samples of the ring differ */
+    holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
+    hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
+    uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
+    uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */
+    uint64_t ring_length;      /* successive samples with the sum of that a period before */
+    uint64_t ring_age;         /* samples since the ring is followed */
+    bool ring_varies;          /* enough readings and samples of the ring differ */
     holdfast_motion motion;
 } holdfast_finger_memory;
 
 /* Result of a finger at its last sample; NaN where there is none. */
 typedef struct {
-    int32_t reason;    /* HOLDFAST_READY, ... */
-    uint32_t faults;   /* HOLDFAST_NOT_FINITE, ... */
-    uint64_t taxels;   /* bit i: taxel i of the finger is faulty by itself */
-    hf_real force[3];  /* F_tip */
-    hf_real amplitude; /* F_a = |F_tip| */
-    hf_real m;         /* equation 1, over sigma_window */
-    hf_real sigma;     /* equation 2, over sigma_window */
+    int32_t reason;            /* HOLDFAST_READY, ... */
+    uint32_t faults;           /* HOLDFAST_NOT_FINITE, ... */
+    holdfast_taxel_set taxels; /* that are faulty by themselves; if there are, so are faults */
+    hf_real force[3];          /* F_tip */
+    hf_real amplitude;         /* F_a = |F_tip| */
+    hf_real m;                 /* equation 1, over sigma_window */
+    hf_real sigma;             /* equation 2, over sigma_window */
 } holdfast_values;
 
 /* Memory of a stream. (clang-format takes the products for pointers.) */
@@ -433,9 +446,19 @@ typedef struct {
 } holdfast_memory;
 /* clang-format on */
 
-/* Functions of the interface: part of each source file that includes an exported header. */
+/* Each file can be compiled by itself: then HF_SHARED, before functions that files share, and
+ * HF_API, before those of the interface, give names to the linker. A file that joins the others
+ * (kernel.c) defines HF_SHARED as static: compilers then see all functions, and an exported header
+ * is part of each source file that includes it. */
 #ifndef HF_API
+#ifdef HF_SHARED
 #define HF_API static inline
+#else
+#define HF_API extern
+#endif
+#endif
+#ifndef HF_SHARED
+#define HF_SHARED
 #endif
 
 #ifdef __cplusplus

@@ -20,6 +20,18 @@
 
 #include "kernel.h"
 
+/* The second number if it is larger, else the first: NaN stays only if it is the first. */
+static inline hf_real hf_max(hf_real a, hf_real b)
+{
+    return b > a ? b : a;
+}
+
+/* The second number if it is smaller, else the first; NaN as above. */
+static inline hf_real hf_min(hf_real a, hf_real b)
+{
+    return b < a ? b : a;
+}
+
 #ifdef __SSE2__
 #include <emmintrin.h>
 #ifdef HOLDFAST_SINGLE
@@ -133,6 +145,41 @@ static inline hf_real hf_total(hf_sum sum)
 static inline hf_real hf_largest_lane(hf_sum sum)
 {
     return hf_max(hf_max(sum.lane[0], sum.lane[1]), hf_max(sum.lane[2], sum.lane[3]));
+}
+
+/* Vectors of some taxels: their x, y and z. */
+typedef struct {
+    hf_wide x, y, z;
+} hf_vectors;
+
+/* Return the vectors (3, n) from a lane on. */
+static inline hf_vectors hf_load_vectors(const hf_real *values, size_t n, size_t i)
+{
+    const hf_vectors v = {
+        hf_load(values + i), hf_load(values + n + i), hf_load(values + 2 * n + i)};
+    return v;
+}
+
+static inline hf_vectors hf_minus(hf_vectors a, hf_vectors b)
+{
+    const hf_vectors v = {a.x - b.x, a.y - b.y, a.z - b.z};
+    return v;
+}
+
+static inline hf_wide hf_squares(hf_vectors v)
+{
+    return v.x * v.x + v.y * v.y + v.z * v.z;
+}
+
+/* Return R_i v_i, with the rotations (9, n) from a lane on. */
+static inline hf_vectors hf_turned(const hf_real *rotations, size_t n, size_t i, hf_vectors v)
+{
+    const hf_real *const r = rotations + i;
+    const hf_vectors turned = {
+        hf_load(r) * v.x + hf_load(r + n) * v.y + hf_load(r + 2 * n) * v.z,
+        hf_load(r + 3 * n) * v.x + hf_load(r + 4 * n) * v.y + hf_load(r + 5 * n) * v.z,
+        hf_load(r + 6 * n) * v.x + hf_load(r + 7 * n) * v.y + hf_load(r + 8 * n) * v.z};
+    return turned;
 }
 
 #endif

@@ -21,12 +21,15 @@
 /* A taxel without a valid reading for this long in the tare is left out until the next [s]. */
 #define HF_LOST_SECONDS ((hf_real)0.5)
 
-/* Let the taxels of some bits, which are at a limit now, count for their last reading. The
- * difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
-static void hf_note_saturated(const hf_finger *f, uint64_t bits)
+/* Let taxels that are at a limit now, and were not left out before, count for their last reading.
+ * The difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
+HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit)
 {
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        for (size_t axis = 0; axis < 3 && (bits & hf_bit(i)); ++axis) {
+        if (!hf_has(at_limit, i) || hf_has(&f->state->masked, i)) {
+            continue;
+        }
+        for (size_t axis = 0; axis < 3; ++axis) {
             const size_t place = axis * f->n + i;
             f->masks[i].fade[axis] += f->previous[place] - f->readings[place];
         }
@@ -34,36 +37,33 @@ static void hf_note_saturated(const hf_finger *f, uint64_t bits)
 }
 
 /* Set the readings of the taxels without a tare to a valid number that never changes. */
-static void hf_hold_lost(const hf_finger *f)
+HF_SHARED void hf_hold_lost(const hf_finger *f)
 {
     const hf_real low = f->finger->low, high = f->finger->high;
     const hf_real neutral = low < 0 && 0 < high ? 0 : (low + high) / 2;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (f->state->lost & hf_bit(i)) {
+        if (hf_has(&f->state->lost, i)) {
             f->readings[i] = f->readings[f->n + i] = f->readings[2 * f->n + i] = neutral;
             f->taxels[i].changed_at = f->state->n_changes; /* no taxel that is still */
         }
     }
 }
 
-static size_t hf_n_bits(uint64_t bits)
-{
-    size_t n = 0;
-    for (; bits; bits &= bits - 1) {
-        ++n;
-    }
-    return n;
-}
-
 /* Count a sample of the tare that is not valid, and leave out its taxels if it lasts. */
-static void hf_lose_taxels(const hf_finger *f, uint32_t faults, uint64_t bits)
+HF_SHARED void hf_lose_taxels(
+    const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid)
 {
     holdfast_finger_memory *const s = f->state;
-    const uint64_t lost = s->lost | bits;
     const hf_real n_used = f->finger->n_used;
+    holdfast_taxel_set lost = s->lost;
+    hf_real n_lost = 0;
+    hf_unite(f, &lost, invalid);
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        n_lost += hf_has(&lost, i) ? 1 : 0;
+    }
     s->n_refused += 1;
-    if ((hf_real)s->n_refused * f->hand->period >= HF_LOST_SECONDS && bits &&
-        n_used - (hf_real)hf_n_bits(lost) >= HF_MIN_HEALTHY_SHARE * n_used) {
+    if ((hf_real)s->n_refused * f->hand->period >= HF_LOST_SECONDS && !hf_is_empty(f, invalid) &&
+        n_used - n_lost >= HF_MIN_HEALTHY_SHARE * n_used) {
         s->lost = lost;
         s->lost_faults |= faults;
     }
@@ -88,12 +88,11 @@ static void hf_load_of(const hf_finger *f, size_t i, hf_real load[3])
 {
     const holdfast_finger_memory *const s = f->state;
     const holdfast_mask *const mask = &f->masks[i];
-    const uint64_t bit = hf_bit(i);
-    if ((s->noisy_taxels | s->lost) & bit) {
+    if (hf_has(&s->noisy_taxels, i) || hf_has(&s->lost, i)) {
         hf_fill(load, 3, 0); /* not known */
         return;
     }
-    const bool is_filled = (s->masked & bit) && !s->too_many;
+    const bool is_filled = hf_has(&s->masked, i) && !s->too_many;
     if (!is_filled) {
         hf_beyond_rest(f, i, load);
     }
@@ -118,10 +117,10 @@ static bool hf_is_unweighed(const hf_finger *f, size_t i)
     if (f->masks[i].unweighed) { /* since a mask before, too */
         return true;
     }
-    if (s->masked & hf_bit(i)) {
+    if (hf_has(&s->masked, i)) {
         return false;
     }
-    return ((s->noisy_taxels | s->lost) & hf_bit(i)) || f->taxels[i].n_changed == 0;
+    return hf_has(&s->noisy_taxels, i) || hf_has(&s->lost, i) || f->taxels[i].n_changed == 0;
 }
 
 /* What a finger carries without some of its taxels. */
@@ -130,8 +129,8 @@ typedef struct {
     bool enough; /* the other taxels carry enough of it */
 } hf_weight;
 
-/* Weigh a finger without the faulty taxels of some bits. */
-static hf_weight hf_weigh(const hf_finger *f, uint64_t bits)
+/* Weigh a finger without some faulty taxels. */
+static hf_weight hf_weigh(const hf_finger *f, const holdfast_taxel_set *faulty)
 {
     const hf_real n_used = f->finger->n_used;
     hf_sum carried = {{0}}, healthy = {{0}}, all_squares = {{0}};
@@ -144,7 +143,7 @@ static hf_weight hf_weigh(const hf_finger *f, uint64_t bits)
         hf_load_of(f, i, load);
         const hf_real square = hf_square(load);
         hf_add(&all_squares, i, square);
-        if (bits & hf_bit(i)) {
+        if (hf_has(faulty, i)) {
             hf_add(&carried, i, hf_sqrt(square));
             n_masked += 1;
             n_unweighed += hf_is_unweighed(f, i);
@@ -166,27 +165,30 @@ static hf_weight hf_weigh(const hf_finger *f, uint64_t bits)
     return weight;
 }
 
-/* Replace the readings of some bits, which are not valid, by the last that were. Return whether
- * enough are valid. */
-static bool hf_replace_invalid(const hf_finger *f, uint64_t bits)
+/* Replace the readings of taxels that are not valid by the last that were. Return whether enough
+ * are valid. */
+HF_SHARED bool hf_replace_invalid(const hf_finger *f, const holdfast_taxel_set *invalid)
 {
     holdfast_finger_memory *const s = f->state;
-    if (bits == 0 || f->n_taxels > HF_N_MASK_BITS) {
+    if (hf_is_empty(f, invalid)) {
         return false;
     }
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        for (size_t axis = 0; axis < 3 && (bits & hf_bit(i)); ++axis) {
+        for (size_t axis = 0; axis < 3 && hf_has(invalid, i); ++axis) {
             f->readings[axis * f->n + i] = f->previous[axis * f->n + i];
             f->taxels[i].changed_at = s->n_changes; /* no taxel that is still */
         }
     }
-    bits |= s->masked | s->faulty_taxels | s->lost;
-    if (bits == s->masked) {
+    holdfast_taxel_set left_out = *invalid;
+    hf_unite(f, &left_out, &s->masked);
+    hf_unite(f, &left_out, &s->faulty_taxels);
+    hf_unite(f, &left_out, &s->lost);
+    if (hf_are_equal(f, &left_out, &s->masked)) {
         return !s->too_many;
     }
-    const hf_weight weight = hf_weigh(f, bits);
+    const hf_weight weight = hf_weigh(f, &left_out);
     for (size_t i = 0; i < f->n_taxels && !weight.known && !weight.enough; ++i) {
-        if (bits & hf_bit(i)) { /* what they would carry stays unknown under a load as well */
+        if (hf_has(&left_out, i)) { /* what they would carry stays unknown under a load as well */
             f->masks[i].unweighed = true;
         }
     }
@@ -210,27 +212,27 @@ static void hf_return_taxel(const hf_finger *f, size_t i, double time)
 }
 
 /* Mask other taxels than before, and let those that come back fade in. */
-static void hf_change_mask(const hf_finger *f, uint64_t bits, double time)
+static void hf_change_mask(const hf_finger *f, const holdfast_taxel_set *faulty, double time)
 {
     holdfast_finger_memory *const s = f->state;
-    const uint64_t before = s->too_many ? 0 : s->masked;
-    const hf_weight weight = hf_weigh(f, bits);
+    const hf_weight weight = hf_weigh(f, faulty);
     hf_sum sum = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        const uint64_t bit = hf_bit(i);
+        const bool was_filled = hf_has(&s->masked, i) && !s->too_many;
+        const bool is_faulty = hf_has(faulty, i);
         holdfast_mask *const mask = &f->masks[i];
         hf_real load[3];
         hf_load_of(f, i, load);
-        if (bits & bit) {
+        if (is_faulty) {
             mask->unweighed = !weight.known || hf_is_unweighed(f, i);
             hf_fill(mask->fade, 3, 0);
-            if ((before & bit) == 0) {
+            if (!was_filled) {
                 mask->masked_at = time;
             }
         } else if (s->n_changes - f->taxels[i].changed_at < HF_STILL_CHANGES) {
             mask->unweighed = false;
         }
-        if (before & bit & ~bits) {
+        if (was_filled && !is_faulty) {
             hf_return_taxel(f, i, time);
             hf_beyond_rest(f, i, load);
             for (size_t axis = 0; axis < 3; ++axis) {
@@ -240,16 +242,19 @@ static void hf_change_mask(const hf_finger *f, uint64_t bits, double time)
         for (size_t axis = 0; axis < 3; ++axis) {
             mask->last_healthy[axis] = load[axis];
         }
-        if (!(bits & bit) && f->used[i] > 0) {
+        if (!is_faulty && f->used[i] > 0) {
             hf_add(&sum, i, hf_square(load));
         }
     }
     /* No window holds the samples of a taxel that became noisy, nor both ways to sum a finger. */
-    if ((s->noisy_taxels & ~s->masked) || (!weight.enough && before)) {
+    holdfast_taxel_set noisy = s->noisy_taxels;
+    hf_exclude(f, &noisy, &s->masked);
+    if (!hf_is_empty(f, &noisy) || (!weight.enough && s->has_masked && !s->too_many)) {
         s->n_stretch = s->motion.n_samples = 0;
     }
     const hf_real squares = hf_total(sum);
-    s->masked = bits;
+    s->masked = *faulty;
+    s->has_masked = !hf_is_empty(f, faulty);
     s->too_many = !weight.enough;
     s->load_known = weight.known && squares > 0;
     s->unloaded = false;
@@ -288,7 +293,7 @@ static void hf_update_fill_ratio(const hf_finger *f)
     holdfast_finger_memory *const s = f->state;
     hf_sum along = {{0}}, squares = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if ((s->masked & hf_bit(i)) || f->used[i] == 0) {
+        if (hf_has(&s->masked, i) || f->used[i] == 0) {
             continue;
         }
         hf_real beyond[3];
@@ -309,12 +314,12 @@ static void hf_fill_taxels(const hf_finger *f)
     if (s->fading) {
         hf_fade_taxels(f);
     }
-    if (s->masked && s->load_known) {
+    if (s->has_masked && s->load_known) {
         hf_update_fill_ratio(f);
     }
     /* f_i = f_i(rest) + ratio shape_i. */
-    for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (s->masked & hf_bit(i)) {
+    for (size_t i = 0; s->has_masked && i < f->n_taxels; ++i) {
+        if (hf_has(&s->masked, i)) {
             hf_real beyond[3];
             hf_beyond_rest(f, i, beyond);
             for (size_t axis = 0; axis < 3; ++axis) {
@@ -326,14 +331,11 @@ static void hf_fill_taxels(const hf_finger *f)
 }
 
 /* Fill in the faulty taxels of a finger. Return false, and fill none, if they carry too much. */
-static bool hf_mask_taxels(const hf_finger *f, uint64_t bits, double time)
+HF_SHARED bool hf_mask_taxels(const hf_finger *f, const holdfast_taxel_set *faulty, double time)
 {
     const holdfast_finger_memory *const s = f->state;
-    if (f->n_taxels > HF_N_MASK_BITS) {
-        return false;
-    }
-    if (bits != s->masked || s->too_many || s->unloaded) {
-        hf_change_mask(f, bits, time);
+    if (!hf_are_equal(f, faulty, &s->masked) || s->too_many || s->unloaded) {
+        hf_change_mask(f, faulty, time);
     }
     if (s->too_many) {
         return false;

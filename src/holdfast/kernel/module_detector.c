@@ -184,7 +184,10 @@ static PyObject *make_finger(const estimates *e, size_t i)
         PyFloat_FromDouble(f->instability),
         Py_BuildValue("(ddd)", f->force[0], f->force[1], f->force[2]),
         f->faults ? from_mask(objects[FAULTS_OF], f->faults) : PyTuple_New(0),
-        f->faults ? from_mask(objects[TAXELS_OF], f->faulty_taxels) : PyTuple_New(0),
+        f->faults ? PyObject_CallFunction(
+                        objects[TAXELS_OF], "y#", (const char *)f->faulty_taxels,
+                        (Py_ssize_t)sizeof f->faulty_taxels)
+                  : PyTuple_New(0),
         Py_XNewRef(PyTuple_GetItem(objects[CAUSES], f->cause)),
         number_of(slip, f->slip_probability),
         number_of(speed, f->slip_speed),

@@ -8,20 +8,13 @@
 
 /* Difference of two spacings, as a share of their sum, up to which they count as equal. */
 #define HF_EVEN_STEPS ((hf_real)0.02)
-/* Time constant with which the largest load so far is forgotten [s]. */
-#define HF_LOAD_DECAY_SECONDS ((hf_real)5)
 /* A block over which noise is measured has at least this duration [s] and these steps. */
 #define HF_NOISE_BLOCK_SECONDS 0.2
 #define HF_MIN_BLOCK_STEPS 5
-/* Noise in the denominator: changes of a load below this many times its noise count less. It is
- * also the least load of a grip (contact.c). */
-#define HF_NOISE_WEIGHT ((hf_real)100)
 /* A force moves if it changes within this time [s] by this many times its noise. The time is that
  * of a lag of the features, eight samples at 60 Hz. */
 #define HF_MOVE_SECONDS 0.133
 #define HF_MOVED_TO_NOISE ((hf_real)5)
-/* Share of the largest load that a released skin may still show. */
-#define HF_RELEASED_SHARE ((hf_real)0.08)
 /* Share of a released force that is normal, at least: friction held the rest. It allows for a
  * friction of 2, and for readings that show shear twice as much. */
 #define HF_LEAST_FALL ((hf_real)0.25)
@@ -93,7 +86,7 @@ static size_t hf_samples_back(
 /* Append forces, centre of pressure and moment of a sample to the ring, and the squares of its step
  * to the block over which the noise is measured. The ring starts again after a gap that is not
  * bridged. Compute F_tip, and return the sum of the normal readings. */
-static hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3])
+HF_SHARED hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3])
 {
     holdfast_motion *const m = &f->state->motion;
     const size_t length = HF_N_TRACK(f->hand);
@@ -409,7 +402,7 @@ static void hf_fill_seconds(
 }
 
 /* Compute the relative features of a finger, after `hf_append_taxels`. */
-static void hf_update_motion(const hf_finger *f, double time)
+HF_SHARED void hf_update_motion(const hf_finger *f, double time)
 {
     const holdfast_hand *const hand = f->hand;
     const size_t length = HF_N_TRACK(hand);

@@ -3,7 +3,7 @@
 #include "finger.h"
 
 /* Return one finger of a hand: its constants, and its part of the memory. */
-static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
+HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index)
 {
     const holdfast_finger *const finger = &hand->fingers[index];
     const size_t first = finger->first, n_lags = HF_N_LAGS(hand);
@@ -40,7 +40,7 @@ static hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory
 }
 
 /* Copy rows of taxels (n_taxels, 3) to the lanes of a finger (3, n); 0 for ignored taxels. */
-static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
+HF_SHARED void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *lanes)
 {
     const hf_real *const row = rows + 3 * f->finger->first_taxel;
     const size_t n = f->n;
@@ -58,7 +58,7 @@ static void hf_copy_to_lanes(const hf_finger *f, const hf_real *rows, hf_real *l
     }
 }
 
-static void hf_clear_values(holdfast_values *values)
+HF_SHARED void hf_clear_values(holdfast_values *values)
 {
     hf_fill(values->force, 3, HF_NAN);
     values->amplitude = values->m = values->sigma = HF_NAN;
@@ -74,7 +74,7 @@ static void hf_begin_gap(const hf_finger *f, hf_real *own)
     hf_clear_values(f->values);
     f->values->reason = HOLDFAST_GAP;
     f->values->faults = 0;
-    f->values->taxels = 0;
+    hf_clear(&f->values->taxels);
 }
 
 /* Compute the force of a valid sample, and return the reason.
@@ -133,23 +133,29 @@ static bool hf_are_valid(const hf_finger *f, const hf_scan *scan)
     return isfinite(scan->total) && scan->least >= f->finger->low && scan->most <= f->finger->high;
 }
 
-/* Replace the readings of a sample that are not valid, if enough are. Return false if not. */
-static bool hf_replace_or_refuse(const hf_finger *f, const hf_scan *scan, uint64_t jumps)
+/* Replace the readings of a sample that are not valid, if enough are. Return false if not.
+ *
+ * jumps: taxels that read zeros, or jump alone; NULL without any. */
+static bool hf_replace_or_refuse(
+    const hf_finger *f, const hf_scan *scan, const holdfast_taxel_set *jumps)
 {
     uint32_t faults = jumps ? HOLDFAST_INVALID : 0;
-    uint64_t bits = jumps;
+    holdfast_taxel_set invalid = {{0}};
     if (!hf_are_valid(f, scan)) {
-        /* Also of taxels beyond the mask. */
+        /* Also where finite readings have a sum that is not. */
         faults |= isfinite(scan->total) ? HOLDFAST_OUT_OF_RANGE : HOLDFAST_NOT_FINITE;
-        bits |= hf_find_invalid(f, &faults);
+        invalid = hf_find_invalid(f, &faults);
+    }
+    if (jumps) {
+        hf_unite(f, &invalid, jumps);
     }
     f->values->faults |= faults;
-    f->values->taxels |= bits;
+    hf_unite(f, &f->values->taxels, &invalid);
     if (!f->state->is_tared) {
-        hf_lose_taxels(f, faults, bits);
+        hf_lose_taxels(f, faults, &invalid);
         return false;
     }
-    return hf_replace_invalid(f, bits);
+    return hf_replace_invalid(f, &invalid);
 }
 
 /* Process a sample of one finger. Return its reason; its faults are in the values. */
@@ -168,14 +174,15 @@ static int32_t hf_process(const hf_finger *f, double time)
     }
     v->faults = s->lost_faults;
     v->taxels = s->lost;
-    if (s->lost) {
+    if (s->lost_faults) {
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
+    holdfast_taxel_set jumps;
     /* After a gap the last sample is too old to show a jump. */
-    const uint64_t jumps = after_gap ? 0 : hf_find_jumps(f, &scan);
-    if (jumps || !hf_are_valid(f, &scan)) {
-        if (!hf_replace_or_refuse(f, &scan, jumps)) {
+    const bool has_jumps = !after_gap && hf_find_jumps(f, &scan, &jumps);
+    if (has_jumps || !hf_are_valid(f, &scan)) {
+        if (!hf_replace_or_refuse(f, &scan, has_jumps ? &jumps : NULL)) {
             s->n_stretch = 0;
             return HOLDFAST_FAULT;
         }
@@ -192,26 +199,33 @@ static int32_t hf_process(const hf_finger *f, double time)
     /* Half a period of tolerance: the rounding of times moves no sample. */
     const hf_real elapsed = (hf_real)(time - s->first_time) + f->hand->period / 2;
     const bool is_saturated = scan.least <= low || scan.most >= high;
-    uint64_t at_limit = 0;
+    holdfast_taxel_set at_limit;
     if (is_saturated) {
         at_limit = hf_taxels_outside(f, low, high);
-        if (s->is_tared && f->n_taxels <= HF_N_MASK_BITS) {
-            hf_note_saturated(f, at_limit & ~s->masked);
+        if (s->is_tared) {
+            hf_note_saturated(f, &at_limit);
         }
     }
     if (!hf_update_tare(f, elapsed)) {
         return HOLDFAST_TARE;
     }
-    v->faults |= s->taxel_faults;
-    v->taxels |= s->faulty_taxels;
+    if (s->taxel_faults) {
+        v->faults |= s->taxel_faults;
+        hf_unite(f, &v->taxels, &s->faulty_taxels);
+    }
     if (is_saturated) {
         v->faults |= HOLDFAST_SATURATED;
-        v->taxels |= at_limit;
+        hf_unite(f, &v->taxels, &at_limit);
+    }
+    const bool has_left_out = v->faults || s->has_masked;
+    holdfast_taxel_set left_out;
+    if (has_left_out) {
+        left_out = v->taxels;
+        hf_unite(f, &left_out, &s->masked);
     }
     /* Before the masks, which compare loads without the field. */
-    const uint32_t field = hf_take_out_field(f, v->taxels | s->masked);
-    const bool has_mask = v->faults || s->masked || s->fading;
-    const bool enough = !has_mask || hf_mask_taxels(f, v->taxels, time);
+    const uint32_t field = hf_take_out_field(f, has_left_out ? &left_out : NULL);
+    const bool enough = !(has_left_out || s->fading) || hf_mask_taxels(f, &v->taxels, time);
     return hf_process_force(f, enough, field, time);
 }
 

@@ -66,8 +66,9 @@ def fields_of(text: str) -> dict[str, list[Field]]:
 
 
 def constants_of(text: str) -> dict[str, int]:
-    """Return the whole numbers that a text of the kernel defines by name, of its enumerations."""
-    return {name: int(value) for name, value in re.findall(r"\b([A-Z]\w+) = (\d+)\b", text)}
+    """Return the whole numbers that a text of the kernel defines by name."""
+    numbers = re.findall(r"(?:\b([A-Z]\w+) =|#define ([A-Z]\w+)) (\d+)\b", text)
+    return {name or macro: int(value) for name, macro, value in numbers}
 
 
 def types_of(

@@ -1,7 +1,7 @@
 /* Tables and memory of a stream: what is checked once, and the state before the first sample. */
 #include "finger.h"
 
-static bool hf_are_finite(const hf_real *values, size_t n)
+HF_SHARED bool hf_are_finite(const hf_real *values, size_t n)
 {
     bool are_finite = true;
     for (size_t i = 0; i < n; ++i) {
@@ -84,7 +84,7 @@ static const char *hf_check_finger(
     const holdfast_hand *hand, const holdfast_finger *finger, size_t first, size_t first_taxel)
 {
     if (finger->first != first || finger->first_taxel != first_taxel || finger->n_taxels < 1 ||
-        finger->n_taxels > hand->n_lanes - first ||
+        finger->n_taxels > HF_MAX_FINGER_TAXELS || finger->n_taxels > hand->n_lanes - first ||
         hf_n_lanes(finger->n_taxels) > hand->n_lanes - first) {
         return "first, first_taxel or n_taxels of a finger";
     }

@@ -43,7 +43,7 @@ static void hf_update_baseline(const hf_finger *f, bool running)
 
 /* Add a sample to the noise and to the tare, and keep it as the previous one. Return whether the
  * tare is complete. */
-static bool hf_update_tare(const hf_finger *f, hf_real elapsed)
+HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed)
 {
     holdfast_finger_memory *const s = f->state;
     if (isnan(s->noise)) {

@@ -3,31 +3,6 @@
  * All numbers here are finite. Lanes without a taxel, and those of ignored taxels, hold zeros in
  * the readings and the rotations. lanes.h has the order of the sums. */
 #include "finger.h"
-#include "lanes.h"
-
-/* Vectors of some taxels: their x, y and z. */
-typedef struct {
-    hf_wide x, y, z;
-} hf_vectors;
-
-/* Return the vectors (3, n) from a lane on. */
-static inline hf_vectors hf_load_vectors(const hf_real *values, size_t n, size_t i)
-{
-    const hf_vectors v = {
-        hf_load(values + i), hf_load(values + n + i), hf_load(values + 2 * n + i)};
-    return v;
-}
-
-static inline hf_vectors hf_minus(hf_vectors a, hf_vectors b)
-{
-    const hf_vectors v = {a.x - b.x, a.y - b.y, a.z - b.z};
-    return v;
-}
-
-static inline hf_wide hf_squares(hf_vectors v)
-{
-    return v.x * v.x + v.y * v.y + v.z * v.z;
-}
 
 /* Return v . n for the normal n of the patch. In an exported header whose normals are all the same
  * axis, that is a component: products with 0 and 1 change no finite number. */
@@ -41,20 +16,9 @@ static inline hf_wide hf_along(hf_vectors v, const hf_real n[3])
 #endif
 }
 
-/* Return R_i v_i, with the rotations (9, n) from a lane on. */
-static inline hf_vectors hf_turned(const hf_real *rotations, size_t n, size_t i, hf_vectors v)
-{
-    const hf_real *const r = rotations + i;
-    const hf_vectors turned = {
-        hf_load(r) * v.x + hf_load(r + n) * v.y + hf_load(r + 2 * n) * v.z,
-        hf_load(r + 3 * n) * v.x + hf_load(r + 4 * n) * v.y + hf_load(r + 5 * n) * v.z,
-        hf_load(r + 6 * n) * v.x + hf_load(r + 7 * n) * v.y + hf_load(r + 8 * n) * v.z};
-    return turned;
-}
-
 /* Compute F_tip = sum_i R_i (f_i - b_i), and return the sum of the normal readings, which are z in
  * the taxel frames. */
-static hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3])
+HF_SHARED hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3])
 {
     const size_t n = f->n;
     hf_sum fx, fy, fz, normal;
@@ -80,21 +44,11 @@ static hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_rea
     return hf_total(normal);
 }
 
-/* Sums over the taxels at a sample. */
-typedef struct {
-    hf_real force[3];         /* F_tip */
-    hf_real normal;           /* sum of the normal readings: z in the taxel frames */
-    hf_real weight;           /* sum p_i */
-    hf_real pressure_squares; /* sum p_i^2 */
-    hf_real squares;          /* sum |h_i|^2 */
-    hf_real moved;            /* sum of the squared steps of the taxels */
-} hf_taxel_sums;
-
 /* Store the taxel forces of a sample at place `now` of the ring, and return sums over the taxels.
  *
  * `before` is the place of the sample before, or any other place without one: `moved` means
  * nothing then. */
-static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t before)
+HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t before)
 {
     /* g_i = R_i (f_i - b_i), F = sum g_i, h_i = g_i - g_i(reference), p_i = |h_i . n|,
      * moved = sum |g_i(k) - g_i(k-1)|^2. */
@@ -145,7 +99,7 @@ static hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t befor
 
 /* Compute sum p_i r_i at a place of the ring, and return the moment about the normal,
  * n . sum r_i x g_i. */
-static hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
+HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
 {
     const size_t n = f->n;
     const hf_real *const ring = hf_forces_at(f, now);
@@ -173,15 +127,9 @@ static hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
     return hf_total(moment);
 }
 
-/* Squared motion of the taxels against their mean, and its part along the normal. */
-typedef struct {
-    hf_real moved;
-    hf_real pressed;
-} hf_residual;
-
 /* Return the motion of the taxels from one place of the ring to another, against `mean`. */
-static hf_residual hf_residual_of(
-    const hf_finger *f, size_t now, size_t then, const hf_real mean[3])
+HF_SHARED hf_residual
+hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3])
 {
     /* sum |u_i|^2 and sum (u_i . n)^2, with u_i = dg_i - mean dg. */
     const size_t n = f->n;
@@ -205,25 +153,7 @@ static hf_residual hf_residual_of(
     return sums;
 }
 
-/* Three samples of a second difference: a g(k) - 2 g(k-s) + c g(k-2s). */
-typedef struct {
-    size_t now; /* places in the ring */
-    size_t before;
-    size_t first;
-    hf_real newest; /* weight a; 1 at even times */
-    hf_real oldest; /* weight c; 1 at even times */
-} hf_second;
-
-/* Sums over the second differences d_i of the taxels. */
-typedef struct {
-    hf_real squares;     /* sum |d_i|^2 */
-    hf_real shared;      /* sum p_i |d_i|^2 */
-    hf_real along;       /* sum p_i (d_i . n)^2 */
-    hf_real weighted[3]; /* sum p_i d_i */
-    hf_real top;         /* largest |d_i|^2 of the taxels with p_i > mean p; 0 without any */
-} hf_second_sums;
-
-static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
+HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
 {
     const size_t n = f->n;
     const hf_real *const ring = hf_forces_at(f, at.now), *const mid = hf_forces_at(f, at.before);
@@ -269,7 +199,7 @@ static hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
 }
 
 /* Return the sum of max(g_i . n, 0) over the taxels at a place of the ring. */
-static hf_real hf_risen(const hf_finger *f, size_t now)
+HF_SHARED hf_real hf_risen(const hf_finger *f, size_t now)
 {
     const size_t n = f->n;
     const hf_real *const ring = hf_forces_at(f, now);

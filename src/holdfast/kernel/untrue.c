@@ -195,23 +195,26 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
     return has_zeros;
 }
 
-/* Return the bits of the magnetometers that read zeros, or jump alone, at this sample. */
-static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
+/* Find the magnetometers that read zeros, or jump alone, at this sample. Return whether there are
+ * any; only then `jumps` is filled. */
+HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps)
 {
     holdfast_finger_memory *const s = f->state;
-    const uint64_t before = s->jumped;
-    s->jumped = 0;
     if (!f->finger->is_magnetic || s->n_seen == 0) {
-        return 0;
+        return false;
     }
     hf_steps steps = hf_find_steps(f);
     if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
-        return 0;
+        hf_clear(&s->jumped);
+        return false;
     }
+    const holdfast_taxel_set before = s->jumped;
+    hf_clear(&s->jumped);
+    hf_clear(jumps);
     /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
     hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
-    uint64_t bits = 0;
+    bool has_zeros = false;
     hf_real n_others = f->finger->n_used;
     for (size_t i = 0; i < f->n_taxels; ++i) {
         if (f->used[i] > 0 && !hf_has_reading(f->readings, n, i)) {
@@ -219,19 +222,21 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
             const hf_real fallen[3] = {then[0], then[n], then[2 * n]};
             steps.total -= hf_square(fallen);
             n_others -= 1;
-            bits |= hf_square(fallen) > 0 ? hf_bit(i) : 0;
+            has_zeros |= hf_square(fallen) > 0;
         }
     }
-    if (isnan(s->noise) && !bits) {
+    if (isnan(s->noise) && !has_zeros) {
         of_noise = hf_max(0, steps.total - steps.largest) / hf_max(n_others - 1, 1);
     }
     /* Zero: |f_i(k-1)|^2 > (20)^2 max(mean |df|^2 of the others, of noise). */
     const hf_real typical = hf_max(of_noise, hf_max(0, steps.total) / hf_max(n_others, 1));
-    for (size_t i = 0; bits && i < f->n_taxels; ++i) {
+    for (size_t i = 0; has_zeros && i < f->n_taxels; ++i) {
         const hf_real *const then = f->previous + i;
         const hf_real fallen[3] = {then[0], then[n], then[2 * n]};
-        if (hf_square(fallen) <= HF_ZERO_TO_STEPS * HF_ZERO_TO_STEPS * typical) {
-            bits &= ~hf_bit(i);
+        const hf_real square = hf_square(fallen);
+        if (f->used[i] > 0 && !hf_has_reading(f->readings, n, i) && square > 0 &&
+            !(square <= HF_ZERO_TO_STEPS * HF_ZERO_TO_STEPS * typical)) {
+            hf_include(jumps, i);
         }
     }
     /* Jump: |df_i|^2 > (50)^2 of noise, and the others' mean |df|^2 <= (3)^2 of noise. Their sum is
@@ -244,16 +249,17 @@ static uint64_t hf_find_jumps(const hf_finger *f, const hf_scan *scan)
             for (size_t axis = 0; axis < 3; ++axis) {
                 step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
             }
-            if (!(bits & hf_bit(i)) && hf_square(step) > quiet) {
-                s->jumped |= hf_bit(i) & ~before; /* at its second sample, a jump is true */
+            if (!hf_has(jumps, i) && !hf_has(&before, i) && hf_square(step) > quiet) {
+                hf_include(&s->jumped, i); /* at its second sample, a jump is true */
             }
         }
     }
-    return bits | s->jumped;
+    hf_unite(f, jumps, &s->jumped);
+    return !hf_is_empty(f, jumps);
 }
 
 /* Return the faults of a finger whose readings, all valid, cannot be true; 0 without any. */
-static uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
+HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
     uint32_t faults = hf_follow_ring(f, scan->total) ? HOLDFAST_REPEATED : 0;

@@ -15,12 +15,6 @@
  * the sums of the block that ends with the sample. */
 #include "finger.h"
 
-/* Return the row of a ring that lies n rows before another; faster than a remainder. */
-static inline size_t hf_row_before(size_t row, size_t n, size_t length)
-{
-    return row >= n ? row - n : row + length - n;
-}
-
 /* Return the number of a block's sums in the ring: (n_history, n_channels, n_levels, 3). */
 static inline hf_real *hf_block(const hf_finger *f, size_t row, size_t channel, size_t level)
 {
@@ -54,14 +48,8 @@ static void hf_append_pair(const hf_finger *f, size_t channel, hf_real older, hf
     }
 }
 
-/* Mean and spread of a window. */
-typedef struct {
-    hf_real m;        /* equation 1 */
-    hf_real variance; /* the square of sigma, equation 2 */
-} hf_moments;
-
 /* Return the moments of the newest window of a channel; the stretch must have as many samples. */
-static hf_moments hf_newest_moments(const hf_finger *f, size_t channel, size_t window)
+HF_SHARED hf_moments hf_newest_moments(const hf_finger *f, size_t channel, size_t window)
 {
     const size_t n_pairs = window / 2, length = HF_N_HISTORY(f->hand);
     hf_real total = 0, drift = 0, spread = 0; /* P, D and S of the pairs taken, the newest first */
@@ -88,7 +76,7 @@ static hf_moments hf_newest_moments(const hf_finger *f, size_t channel, size_t w
 }
 
 /* Return the sigma that noise of a standard deviation gives in a window. */
-static hf_real hf_noise_sigma(hf_real noise, size_t window)
+HF_SHARED hf_real hf_noise_sigma(hf_real noise, size_t window)
 {
     /* E[sigma^2] of white noise: d = (x_0 - x_1) / sqrt(2) has the variance noise^2, and
      * sum (d - mean d)^2 over N_w / 2 pairs, divided by N_w, has (N_w / 2 - 1) / N_w of it. */
@@ -96,14 +84,8 @@ static hf_real hf_noise_sigma(hf_real noise, size_t window)
     return noise * hf_sqrt((n_w - 2) / (2 * n_w));
 }
 
-/* Return the force in the ring of the history that lies `back` samples before the newest. */
-static inline const hf_real *hf_history(const hf_finger *f, size_t back)
-{
-    return f->history + hf_row_before(f->state->row, back, HF_N_HISTORY(f->hand)) * HF_N_COMPONENTS;
-}
-
 /* Append a force to the history of a finger and to its windows, and write it to the values. */
-static void hf_append_force(const hf_finger *f, const hf_real force[3])
+HF_SHARED void hf_append_force(const hf_finger *f, const hf_real force[3])
 {
     const size_t length = HF_N_HISTORY(f->hand);
     const size_t row = (size_t)(f->state->n_stretch % (int64_t)length);

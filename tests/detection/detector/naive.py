@@ -87,8 +87,6 @@ class Mask:
     def weigh(self, readings, taxels):
         """Whether the load is known, and whether half of it, or of the taxels, is healthy."""
         used = self.finger.used
-        if len(readings) > 63:
-            return False, False
         loads = {i: self.load(readings, i) for i in used}
         sizes = {i: float(np.linalg.norm(loads[i])) for i in used}
         known = sum(size**2 for size in sizes.values()) > (10 * self.finger.noise) ** 2
@@ -109,13 +107,11 @@ class Mask:
         low, high = sensor.range or (-math.inf, math.inf)
         for i in set(self.finger.used) - self.taxels:
             at_limit = ((readings[i] <= low) | (readings[i] >= high)).any()
-            if at_limit and len(readings) <= 63:
+            if at_limit:
                 fade = self.fades.get(i, np.zeros(3))
                 self.fades[i] = fade + samples[-2][1][i] - readings[i]
 
     def update(self, readings, taxels, time):
-        if len(readings) > 63:
-            return False
         if taxels != self.taxels or self.too_many or self.unloaded:
             self.change(readings, taxels, time)
         if not self.too_many:
@@ -216,7 +212,7 @@ class Finger:
     def refuse(self, faults, taxels):
         self.interrupt()
         self.status, self.faults = "fault", tuple(fault for fault in ORDER if fault in faults)
-        self.faulty_taxels = tuple(sorted(i for i in taxels if i < 63))
+        self.faulty_taxels = tuple(sorted(taxels))
 
     def take(self, time, given):
         readings = np.zeros_like(given)
@@ -495,7 +491,7 @@ class Finger:
         noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
-        self.wrong_taxels = {i for i in dead | stuck | noisy if i < 63}
+        self.wrong_taxels = dead | stuck | noisy
 
     def compare_axis(self, axis, now, low, high):
         """Magnetometers of which one axis is the same for long, while those of others move."""
@@ -514,7 +510,7 @@ class Finger:
         for i, (value, same, longest, n) in pasts.items():
             least = (2 if n >= 10 else 30) / 0.15
             before = longest if n >= 10 else max(longest, *moving)
-            if same >= max(least, 5 * (before + 1)) and low < value < high and i < 63:
+            if same >= max(least, 5 * (before + 1)) and low < value < high:
                 found.add(i)
         return found
 
@@ -562,7 +558,7 @@ class Finger:
         at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
         if at_limit:
             faults.add("saturated")
-        return faults, taxels | {i for i in at_limit if i < 63}
+        return faults, taxels | at_limit
 
     def is_stuck(self):
         half_a_second = 0.5 / self.period

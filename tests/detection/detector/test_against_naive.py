@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.contact import Cause, Fault
+from holdfast.contact import Cause, ContactState, Fault
 from holdfast.detection import ANY_FINGER, Debounce, Detector, Model, Tare
 
 from . import naive
@@ -106,6 +106,30 @@ def test_equals_the_naive_detector(options, seed):
         same(estimate, slow.update(samples, time))
         seen |= {(x.state, x.reason, *x.faults) for x in estimate.fingers.values()}
     assert len(seen) >= 5  # of states, reasons and faults together
+
+
+@pytest.mark.parametrize("n_taxels", [64, 65, 87, 120, 512])
+def test_a_large_finger_goes_on_without_taxels_beyond_index_60(n_taxels):
+    """One jumps once, one is lost, and one freezes, under a press."""
+    lost, jumping, frozen = n_taxels - 1, n_taxels - 2, n_taxels - 3
+    which = sensor(n_taxels, "large", limits=(0.0, 65_535.0), magnetic=True)
+    rng = np.random.default_rng(n_taxels)
+    values = np.rint(30_000 + rng.normal(scale=3, size=(220, n_taxels, 3)))
+    values[60:, :, 2] += np.rint(np.linspace(0, 100, n_taxels))
+    values[70:, lost, 1] = np.nan
+    values[50, jumping] += 9000
+    values[90:, frozen] = values[90, frozen]
+    hand_model = model(("thumb",), which=which, threshold=30.0)
+    detector, sensors = Detector(hand_model), {"thumb": which}
+    slow = naive.Hand(hand_model, sensors, Tare.parse(hand_model.tare), RATE)
+    named = []
+    for k, readings in enumerate(values):
+        estimate = detector.update({"thumb": readings}, k / RATE)
+        same(estimate, slow.update({"thumb": readings}, k / RATE))
+        named.append(estimate.fingers["thumb"].faulty_taxels)
+        assert k < 40 or estimate.fingers["thumb"].state is not ContactState.UNKNOWN
+    assert (named[49], named[50], named[69], named[70]) == ((), (jumping,), (), (lost,))
+    assert named[-1] == (frozen, lost)
 
 
 @pytest.mark.parametrize("seed", range(4))

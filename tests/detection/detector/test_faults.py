@@ -1,5 +1,6 @@
 """Faults that show in the readings: their estimates, their begin and their end."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -7,10 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.contact import STABLE, ContactState, Fault, Reason
+from holdfast.contact import STABLE, ContactState, Fault, Reason, n_mask_words
 from holdfast.detection import ANY_FINGER, Detector, Model, Tare, detect
-from holdfast.recordings import Recording, Tactile
+from holdfast.errors import ModelError
+from holdfast.exporters import header_of
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast.synthetic import synthetic_recording
+from holdfast.training import train
 
 from . import naive
 from .build import RATE, feed, finger_model, lively, model, recording, runs, sensor, tactile
@@ -418,16 +422,6 @@ class TestNoisy:
         assert {e.faults for e in estimates_of(quiet, IN_NEWTONS)} == {()}
 
 
-class TestTaxelsBeyondAMask:
-    def test_faults_of_taxels_beyond_the_mask_are_reported(self):
-        which = sensor(70, limits=(0.0, 65_535.0))
-        values = white(400, which)
-        values[:, [3, 66]] = 30_000.0
-        assert told_faults(values, which)[-1] == (((Fault.DEAD,), (3,)), 200)
-        values[300, 66, 0] = np.nan
-        assert estimates_of(values, which)[300].faulty_taxels == ()
-
-
 class TestTareDrift:
     def crept(self, seconds, height=400.0, n=2000, start=500):
         """F_a that rises to `height` in a number of seconds, and remains there."""
@@ -612,20 +606,45 @@ def test_equals_the_naive_detector_live_and_in_any_chunks(sick, tare, noise, cut
         assert repr(estimate.fingers["finger1"]) == repr(row)
 
 
-def test_a_recording_says_which_taxels():
-    values = white(400)
-    values[:, 4] = 30_000.0
-    made = recording(thumb=Tactile(TIP, np.arange(400) / RATE, values))
-    found = detect(model(("thumb",), which=TIP), made).fingers["thumb"]
-    assert found.faulty_taxels[[199, 200]].tolist() == [0, 1 << 4]
-    assert found.estimate(200).faulty_taxels == (4,)
+@pytest.mark.parametrize(("n_taxels", "dead"), [(6, 4), (64, 63), (70, 66), (512, 511)])
+def test_a_recording_says_which_taxels(n_taxels, dead):
+    which = sensor(n_taxels, "large", limits=(0.0, 65_535.0))
+    values = white(400, which)
+    values[:, dead] = 30_000.0
+    made = recording(thumb=Tactile(which, np.arange(400) / RATE, values))
+    detection = detect(model(("thumb",), which=which), made)
+    found = detection.fingers["thumb"]
+    words = [0] * n_mask_words(n_taxels)
+    assert found.faulty_taxels[199].tolist() == words
+    words[dead // 64] = 1 << dead % 64
+    assert found.faulty_taxels[200].tolist() == words
+    assert found.estimate(200).faulty_taxels == (dead,)
+    assert detection.to_frame()["faulty_taxels"][200] == str(dead + 1)
 
 
-def test_a_reading_out_of_range_is_named_beyond_the_bits_of_a_mask():
-    which = sensor(70, "wide")
-    detector = Detector(model(("thumb",), which=which, tare="first"))
-    values = np.array(tactile(60, which=which).readings)
-    values[40, 66, 2] = 5000.0
-    found = feed(detector, values)
-    assert found[40].reason is Reason.FAULT
-    assert (found[40].faults, found[40].faulty_taxels) == ((Fault.OUT_OF_RANGE,), ())
+LARGE = sensor(513, "large")
+READINGS = Tactile(
+    LARGE, np.arange(300) / RATE, np.zeros((300, LARGE.n_taxels, 3)),
+    labels=(Label(1.0, 2.0, ContactState.STABLE), Label(2.0, 3.0, ContactState.UNSTABLE)),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda floor: Detector(floor, {"skin": LARGE}),
+        lambda floor: detect(floor, recording(skin=READINGS)),
+        lambda floor: header_of(floor, {"skin": LARGE}, RATE),
+        lambda floor: train(
+            [
+                Recording(name, {"skin": replace(READINGS, readings=np.full((300, 513, 3), k))})
+                for k, name in enumerate("ab")
+            ]
+        ),
+        lambda floor: model(("skin",), which=LARGE),
+    ],
+    ids=["Detector", "detect", "export", "train", "a model"],
+)
+def test_a_sensor_of_more_than_512_taxels_is_refused(use):
+    with pytest.raises(ModelError, match=r"^.*(513.*512|512.*513).*$"):
+        use(Model.load("builtin:noise-floor"))

@@ -218,7 +218,7 @@ def test_a_magnetometer_that_goes_on_sending_zeros_is_left_out():
     times, readings, _ = still_hold()
     readings[500:, 3] = 0
     trace = estimates(times, readings)
-    assert (trace.faulty_taxels[500:] == 8).all()
+    assert (trace.faulty_taxels[500:, 0] == 8).all()
     assert (trace.state[500:890] == STABLE).all()
 
 
@@ -243,7 +243,7 @@ def test_a_stuck_axis_of_one_magnetometer_leaves_it_out(name, start, seconds):
     assert not clean.faults.any()
     readings[start:, 2, 1] = readings[start, 2, 1]
     trace = estimates(times, readings, which)
-    named = np.flatnonzero(trace.faulty_taxels == 4)
+    named = np.flatnonzero(trace.faulty_taxels[:, 0] == 4)
     assert 0 <= times[named[0]] - times[start] - seconds < 1.5
     assert {faults_of(mask) for mask in trace.faults[named].tolist()} == {(Fault.STUCK,)}
     assert len(named) == 3500 - named[0]  # until the end

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from holdfast.contact import LABEL_STATES, Fault
+from holdfast.contact import LABEL_STATES, MAX_TAXELS, Fault, taxels_of
 from holdfast.detection import Detector, Model, Tare
 from holdfast.errors import RecordingError
 from holdfast.io import read_chunks
@@ -108,12 +108,11 @@ class _FaultCounts:
         self._counts: dict[str, dict[Fault, int]] = {}
         self._model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare=str(tare))
         self._detectors: dict[str, Detector] = {}
-        self._stuck: dict[str, int] = {}  # bits of the taxels
+        self._stuck: dict[str, set[int]] = {}
 
     def stuck_taxels(self, name: str) -> list[int]:
         """Return the numbers of the taxels of a module that were stuck, from 1."""
-        bits = self._stuck.get(name, 0)
-        return [taxel_number(i) for i in range(bits.bit_length()) if bits >> i & 1]
+        return [taxel_number(i) for i in sorted(self._stuck.get(name, ()))]
 
     def of(self, name: str) -> Mapping[Fault, int]:
         """Return the number of samples of a module with each fault."""
@@ -122,7 +121,7 @@ class _FaultCounts:
     def add(self, part: Recording) -> None:
         """Add a recording, or its next part."""
         for name, module in part.modules.items():
-            if not module.n_samples:
+            if not module.n_samples or module.sensor.n_taxels > MAX_TAXELS:
                 continue
             alone = replace(part, modules={name: module}, truth=None)
             if name not in self._detectors:
@@ -132,7 +131,7 @@ class _FaultCounts:
             masks = trace.faults
             # Alone: with another fault at the same sample, it may be of another taxel.
             is_stuck = masks == 1 << list(Fault).index(Fault.STUCK)
-            bits = int(np.bitwise_or.reduce(trace.faulty_taxels[is_stuck], initial=0))
-            self._stuck[name] = self._stuck.get(name, 0) | bits
+            words = np.bitwise_or.reduce(trace.faulty_taxels[is_stuck], axis=0)
+            self._stuck.setdefault(name, set()).update(taxels_of(words))
             for bit, fault in enumerate(Fault):
                 self._counts[name][fault] += int((masks >> bit & 1).sum())

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from holdfast.contact import MAX_TAXELS
 from holdfast.detection import RELATIVE_RATES
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
@@ -34,6 +35,7 @@ FindingKind = Literal[
     "axes",
     "unit",
     "one_taxel",
+    "many_taxels",
     "rate",
     "starts_loaded",
     "no_contact",
@@ -171,6 +173,9 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         yield "rate", f"{rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
     if module.sensor.n_taxels == 1:
         yield "one_taxel", "one taxel: taxels cannot be compared, only its force is judged"
+    if module.sensor.n_taxels > MAX_TAXELS:
+        text = f"{module.sensor.n_taxels} taxels; a detector takes at most {MAX_TAXELS}, so no "
+        yield "many_taxels", text + "faults are looked for"
     still = [axis for axis, is_still in zip(AXES, module.still, strict=True) if is_still]
     if len(still) == len(AXES):
         yield "dead", "the readings never change: the sensor is dead or disconnected"
@@ -207,8 +212,8 @@ DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
     "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel", "no_contact",
-    "no_labels",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel",
+    "many_taxels", "no_contact", "no_labels",
 )  # fmt: skip
 
 
