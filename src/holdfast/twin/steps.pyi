@@ -6,7 +6,7 @@ from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact
 from holdfast.twin.control import Controller
 from holdfast.twin.hand import HandArrays
-from holdfast.twin.physics import Action, HalfSteps, Physics
+from holdfast.twin.physics import Action, Physics
 from holdfast.twin.uskin_readout import Counts, _Constants, _State
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -139,23 +139,10 @@ def disturb_wrench(
 ) -> Wrench:
     """Return the wrench of a disturbance; `origin` (12,) is the pose when it began."""
 
-def advance_sample(
-    engine: HalfSteps, physics: Physics, tick: int, target: Array, action: Action, /
-) -> float:
-    """Advance the physics by a sample; return the largest error of a set-point [rad].
-
-    Args:
-        engine: model and state of MuJoCo.
-        physics: everything else; it is written.
-        tick: number of the first step.
-        target: (16,) set-points of the joints [rad].
-        action: what the operator does.
-    """
-
 def apply_all(
     physics: Physics, tick: int, k: int, target: Array, action: Action, time: float, /
 ) -> float:
-    """Apply all forces of step `k` of a sample, as `advance_sample` between the half steps."""
+    """Apply all forces of step `k` of a sample; return the largest error of a set-point [rad]."""
 
 def saturated(newtons: float, limit: float, /) -> float:
     """Return a reading that saturates at a limit [N]."""

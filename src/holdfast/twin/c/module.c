@@ -92,11 +92,6 @@ static void run_disturb_wrench(arguments *a, double *out)
         a->body, a->anchor, a->parameters, a->style, a->duration, a->tremor, a->rms, a->elapsed);
 }
 
-static void run_advance_sample(arguments *a, double *out)
-{
-    *out = advance_sample(&a->engine, &a->physics, a->tick, a->target, &a->action);
-}
-
 static void run_apply_all(arguments *a, double *out)
 {
     *out = apply_all(&a->physics, a->tick, a->step, a->target, &a->action, a->time);
@@ -135,7 +130,6 @@ static function functions[] = {
     {"hold_wrench", hold_wrench_arguments, run_hold_wrench, 6},
     {"guide_wrench", guide_wrench_arguments, run_guide_wrench, 6},
     {"disturb_wrench", disturb_wrench_arguments, run_disturb_wrench, 6},
-    {"advance_sample", advance_sample_arguments, run_advance_sample, 1},
     {"apply_all", apply_all_arguments, run_apply_all, 1},
     {"saturated", saturated_arguments, run_saturated, 1},
     {"read_out", read_out_arguments, run_read_out, 0},
@@ -218,8 +212,6 @@ static int read_struct(call *c, field *fields, PyObject *object, char *target)
 static const char *wrong_numbers(const call *c, const function *f, const arguments *a)
 {
     const hand *const h = &a->physics.arrays;
-    const steps *const s = &a->physics.steps;
-    const half_steps *const e = &a->engine;
     const int64_t most = INT64_MAX / 2; /* so that no sum overflows */
     if (c->lengths[-N_TIPS] >= 0 && c->lengths[-N_BODIES] >= 0 &&
         c->lengths[-N_BODIES] != c->lengths[-N_TIPS] + 1) {
@@ -249,11 +241,8 @@ static const char *wrong_numbers(const call *c, const function *f, const argumen
     }
     if (a->tick < 0 || a->tick > most || a->step < 0 || a->step > most ||
         (f->run == run_tremor_at && a->step > 2) ||
-        (a->physics.bodies != NULL && (s->n < 0 || s->n > most || s->per_control < 1))) {
+        (f->run == run_apply_all && a->physics.per_control < 1)) {
         return "a number of a step or an axis is out of range";
-    }
-    if (f->run == run_advance_sample && !(e->first_half && e->second_half && e->model && e->data)) {
-        return "engine: an address is 0";
     }
     if (f->run == run_read_out &&
         (a->constants.line < 1 || c->lengths[-N_DRAWN] != 1 + 3 * c->lengths[-N_TAXELS])) {

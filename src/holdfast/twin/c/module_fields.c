@@ -81,11 +81,6 @@ static field controller_fields[] = {
     LENGTH(controller, n_noise, N_NOISE), LENGTH(controller, n_errors, N_ERRORS), {0},
 };
 
-static field engine_fields[] = {
-    WHOLE(half_steps, first_half), WHOLE(half_steps, second_half), WHOLE(half_steps, model),
-    WHOLE(half_steps, data), {0},
-};
-
 static field action_fields[] = {
     IN(action, anchor, N_NUMBERS(pose)), REAL(action, hold), REAL(action, weight),
     IN(action, tremors, 2, 3, N_SINUSOIDS, 3), REAL(action, rms), REAL(action, time),
@@ -94,18 +89,11 @@ static field action_fields[] = {
     IN(action, guide, N_NUMBERS(guide)), LENGTH(action, n_sinusoids, N_SINUSOIDS), {0},
 };
 
-static field steps_fields[] = {
-    WHOLE(steps, n), REAL(steps, period), WHOLE(steps, per_control), {0},
-};
-
-static field wrenches_fields[] = {OUT(wrenches, outside, 6), OUT(wrenches, total, 6), {0}};
-
 static field physics_fields[] = {
-    STRUCT(physics, steps, steps_fields), STRUCT(physics, arrays, hand_fields),
-    STRUCT(physics, contact, contact_fields), STRUCT(physics, constants, constants_fields),
-    STRUCT(physics, controller, controller_fields),
-    OUT(physics, bodies, N_BODIES, N_NUMBERS(body)),
-    STRUCT(physics, wrenches, wrenches_fields), {0},
+    STRUCT(physics, arrays, hand_fields), STRUCT(physics, contact, contact_fields),
+    STRUCT(physics, constants, constants_fields), STRUCT(physics, controller, controller_fields),
+    OUT(physics, bodies, N_BODIES, N_NUMBERS(body)), OUT(physics, outside, 6),
+    OUT(physics, total, 6), REAL(physics, period), WHOLE(physics, per_control), {0},
 };
 
 static field taxels_fields[] = {
@@ -136,7 +124,6 @@ static field readout_state_fields[] = {
 /* The arguments of the functions. */
 typedef struct {
     physics physics;
-    half_steps engine;
     action action;
     readout_constants constants;
     readout_state state;
@@ -169,8 +156,6 @@ typedef struct {
 #define CONSTANTS STRUCT(arguments, physics.constants, constants_fields)
 #define CONTROLLER STRUCT(arguments, physics.controller, controller_fields)
 #define BODIES IN(arguments, bodies, N_BODIES, N_NUMBERS(body))
-#define PHYSICS STRUCT(arguments, physics, physics_fields)
-#define ACTION STRUCT(arguments, action, action_fields)
 #define TARGET IN(arguments, target, N_JOINTS)
 #define SOLID IN(arguments, solid, N_NUMBERS(solid))
 #define POINT NUMBER(point.x), NUMBER(point.y), NUMBER(point.z)
@@ -218,11 +203,9 @@ static field disturb_wrench_arguments[] = {
     IN(arguments, parameters, N_NUMBERS(disturbance)), WHOLE(arguments, style), NUMBER(duration),
     TREMOR, NUMBER(rms), NUMBER(elapsed), {0},
 };
-static field advance_sample_arguments[] = {
-    STRUCT(arguments, engine, engine_fields), PHYSICS, WHOLE(arguments, tick), TARGET, ACTION, {0},
-};
 static field apply_all_arguments[] = {
-    PHYSICS, WHOLE(arguments, tick), WHOLE(arguments, step), TARGET, ACTION, NUMBER(time), {0},
+    STRUCT(arguments, physics, physics_fields), WHOLE(arguments, tick), WHOLE(arguments, step),
+    TARGET, STRUCT(arguments, action, action_fields), NUMBER(time), {0},
 };
 static field saturated_arguments[] = {NUMBER(newtons), NUMBER(limit), {0}};
 static field read_out_arguments[] = {
