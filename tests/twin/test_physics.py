@@ -9,13 +9,13 @@ from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import NO_GUIDE, draw_tremor
-from holdfast.twin.physics import Action, advance_sample
+from holdfast.twin.physics import Action
 from holdfast.twin.steps import (
     GUIDE_STIFFNESS,
     JERK,
     MOVE,
     PUSH,
-    apply_all,
+    advance_sample,
     apply_forces,
     control,
     disturb_wrench,
@@ -102,7 +102,7 @@ def test_a_sample_is_its_steps_called_from_python(words):
         target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))  # closes until it presses
         given = [action(one, **words) for one in (compiled, plain)]
         tick = sample * SUBSTEPS
-        error = advance_sample(compiled.hand, compiled._physics, tick, target, given[0])
+        error = advance_sample(*compiled._half_steps, compiled._physics, tick, target, given[0])
         ticks = range(tick, tick + SUBSTEPS)
         worst.append(max(step_from_python(plain, tick, target, given[1]) for tick in ticks))
         assert error == worst[-1]
@@ -118,9 +118,25 @@ def test_a_sample_is_its_steps_called_from_python(words):
     assert 0 < np.count_nonzero(worst) < len(worst)
 
 
-@pytest.mark.parametrize(("tick", "step", "per_control"), [(-1, 0, 3), (0, -1, 3), (0, 0, 0)])
-def test_numbers_that_no_step_could_use_are_refused(tick, step, per_control):
+@pytest.mark.parametrize(
+    ("tick", "change"), [(-1, {}), (0, {"n_steps": -1}), (0, {"per_control": 0})]
+)
+def test_numbers_that_no_step_could_use_are_refused(tick, change):
     world = made_world()
-    given = world._physics._replace(per_control=per_control)
+    given = world._physics._replace(**change)
     with pytest.raises(ValueError, match="out of range"):
-        apply_all(given, tick, step, np.zeros(16), action(world), 0.0)
+        advance_sample(*world._half_steps, given, tick, np.zeros(16), action(world))
+
+
+@pytest.mark.parametrize("n_calls", [1, 2, 3, 4])
+def test_an_exception_of_a_half_step_is_raised(n_calls):
+    world, calls = made_world(), []
+
+    def half_step():
+        calls.append(1)
+        if len(calls) == n_calls:
+            raise KeyError("stopped")
+
+    with pytest.raises(KeyError, match="stopped"):
+        advance_sample(half_step, half_step, world._physics, 0, np.zeros(16), action(world))
+    assert len(calls) == n_calls

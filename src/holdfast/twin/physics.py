@@ -1,13 +1,11 @@
-"""A sample of physics: MuJoCo's steps, and the forces on hand and object between their halves."""
+"""What `steps.advance_sample` needs for a sample of physics, in c/physics.c."""
 
 from typing import NamedTuple
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact
 from holdfast.twin.control import Controller
-from holdfast.twin.hand import SUBSTEPS, HandArrays, HandModel
-from holdfast.twin.mujoco_import import mujoco
-from holdfast.twin.steps import apply_all
+from holdfast.twin.hand import HandArrays
 
 
 class Action(NamedTuple):
@@ -57,6 +55,7 @@ class Physics(NamedTuple):
         outside: (6,) force [N] and torque about the centre of mass [N m] of operator and loads on
             the object, in the world frame.
         total: (6,) the same of operator, loads and fingers.
+        n_steps: steps of a sample.
         period: duration of a step [s], that of the model.
         per_control: steps in a step of the controller.
     """
@@ -68,25 +67,6 @@ class Physics(NamedTuple):
     bodies: Array
     outside: Array
     total: Array
+    n_steps: int
     period: float
     per_control: int
-
-
-def advance_sample(
-    hand: HandModel, physics: Physics, tick: int, target: Array, action: Action
-) -> float:
-    """Advance the physics by a sample; return the largest error of a set-point [rad].
-
-    Args:
-        hand: model and state of MuJoCo.
-        physics: everything else; it is written.
-        tick: number of the first step.
-        target: (16,) set-points of the joints [rad].
-        action: what the operator does.
-    """
-    worst = 0.0
-    for k in range(SUBSTEPS):
-        mujoco.mj_step1(hand.model, hand.data)
-        worst = max(worst, apply_all(physics, tick, k, target, action, hand.data.time))
-        mujoco.mj_step2(hand.model, hand.data)
-    return worst

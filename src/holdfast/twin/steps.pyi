@@ -1,5 +1,7 @@
 """Functions in C (`c/steps.h`). They refuse all but arrays in C order of the right shape."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from holdfast.sensors.types import Array
@@ -139,10 +141,25 @@ def disturb_wrench(
 ) -> Wrench:
     """Return the wrench of a disturbance; `origin` (12,) is the pose when it began."""
 
-def apply_all(
-    physics: Physics, tick: int, k: int, target: Array, action: Action, time: float, /
+def advance_sample(
+    first_half: Callable[[], None],
+    second_half: Callable[[], None],
+    physics: Physics,
+    tick: int,
+    target: Array,
+    action: Action,
+    /,
 ) -> float:
-    """Apply all forces of step `k` of a sample; return the largest error of a set-point [rad]."""
+    """Advance the physics by a sample; return the largest error of a set-point [rad].
+
+    Args:
+        first_half: `mj_step1` of MuJoCo's model and state.
+        second_half: `mj_step2` of them.
+        physics: everything else; it is written.
+        tick: number of the first step.
+        target: (16,) set-points of the joints [rad].
+        action: what the operator does.
+    """
 
 def saturated(newtons: float, limit: float, /) -> float:
     """Return a reading that saturates at a limit [N]."""

@@ -1,4 +1,4 @@
-/* The forces between MuJoCo's half steps, which physics.py calls: contact, operator, controller. */
+/* The forces between MuJoCo's half steps: contact, operator, controller. */
 #include "steps.h"
 
 /* What the operator does during a sample, and the loads on the object: see `Action`. */
@@ -24,6 +24,7 @@ typedef struct {
     controller controller;
     body *bodies;
     wrench *outside, *total; /* on the object: of operator and loads, and with the fingers' */
+    int64_t n_steps;         /* of a sample */
     double period;           /* of a step, that of the model [s] */
     int64_t per_control;     /* steps in a step of the controller */
 } physics;
