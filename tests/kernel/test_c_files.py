@@ -20,10 +20,7 @@ FLAGS = (
 @pytest.mark.parametrize(
     "name",
     [
-        *(
-            f"kernel/{name}.c"
-            for name in ("module", "haar", "force", "counts", "kernel", "offline")
-        ),
+        *(f"kernel/{name}.c" for name in ("module", "haar", "force", "kernel", "offline")),
         "twin/c/module.c",
     ],
 )
