@@ -23,13 +23,18 @@ import numpy as np
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from exporters.c_detector import both, compare, random_samples  # noqa: E402
-from holdfast.classifiers import Linear  # noqa: E402
-from holdfast.detector import Detector  # noqa: E402
+from detection.c_detector import both, compare, random_samples  # noqa: E402
+from holdfast.detection import (  # noqa: E402  # noqa: E402
+    DEPLOYED_FEATURES,
+    Detector,
+    FingerModel,
+    Head,
+    Linear,
+    Model,
+    parse_features,
+)
+from holdfast.detection.c_header import code_size  # noqa: E402
 from holdfast.exporters import header_of  # noqa: E402
-from holdfast.exporters.c_header import code_size  # noqa: E402
-from holdfast.features import DEPLOYED_FEATURES, parse_features  # noqa: E402
-from holdfast.model import FingerModel, Head, Model  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402
 
 FINGERS = ("thumb", "index", "middle", "ring")

@@ -22,11 +22,10 @@ from matplotlib.patches import Patch
 from PIL import Image
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
-from holdfast.detector import FingerTrace, detect
+from holdfast.detection import FingerTrace, Model, detect
 from holdfast.io.importers import import_recordings
 from holdfast.live.health import module_health
 from holdfast.live.module_checks import HoldDrift, ModuleComparison
-from holdfast.model import Model
 from holdfast.plots import COLOURS
 from holdfast.plots.sensors import plot_noise
 from holdfast.plots.style import (

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import STABLE
-from holdfast.detector import detect
-from holdfast.features.stream import extract
+from holdfast.detection import Model, detect
+from holdfast.detection.features import extract
 from holdfast.metrics.slip_truth import SLIDING, STILL, slip_truth
-from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.resampling import true_updates
 from holdfast.training.calibration import location_and_scale

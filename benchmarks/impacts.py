@@ -17,7 +17,7 @@ from scipy.stats import rankdata, spearmanr
 from train_slips import plan_of
 
 from holdfast import Model, fingertip_force, load_dataset
-from holdfast.features.specs import SLIP_FEATURES
+from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.metrics.slip_truth import STILL_SPEED, finger_slips, truth_impacts
 from holdfast.metrics.slips import count_slips
 from holdfast.parallel import Engine

@@ -21,12 +21,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
+from holdfast.detection import Model
 from holdfast.devices.sources import open_source
 from holdfast.io import save_recording
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web.service import LiveService
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.web.guard import Guard
 

@@ -27,12 +27,11 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
-from holdfast.detector import FingerTrace, detect
+from holdfast.detection import FingerTrace, Model, detect
 from holdfast.errors import HoldfastError
 from holdfast.io.importers import import_recordings
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
-from holdfast.model import Model
 from holdfast.recordings import Recording, label_states
 from holdfast.training.calibration import calibrate
 

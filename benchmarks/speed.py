@@ -20,13 +20,19 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.classifiers import Linear
-from holdfast.detector import Detector
+from holdfast.detection import DEFAULT_WINDOW as WINDOW
+from holdfast.detection import (
+    DEPLOYED_FEATURES,
+    Detector,
+    FingerModel,
+    Head,
+    Linear,
+    Model,
+    haar_features,
+    parse_features,
+)
 from holdfast.errors import is_installed
-from holdfast.features import DEFAULT_WINDOW as WINDOW
-from holdfast.features import DEPLOYED_FEATURES, haar_features, parse_features
 from holdfast.kernel.batch import fill_haar_features
-from holdfast.model import FingerModel, Head, Model
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
 

@@ -33,10 +33,17 @@ from scipy.optimize import minimize
 from scipy.special import expit
 from sklearn.metrics import roc_auc_score
 
-from holdfast.classifiers import Linear
-from holdfast.features import FeatureSpec, parse_features
+from holdfast.detection import (
+    Debounce,
+    FeatureSpec,
+    FingerModel,
+    Head,
+    Linear,
+    Model,
+    Training,
+    parse_features,
+)
 from holdfast.io import load_dataset
-from holdfast.model import Debounce, FingerModel, Head, Model, Training
 
 FEATURES = parse_features("any")
 C = 1e-3

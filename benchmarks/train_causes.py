@@ -20,10 +20,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Cause
-from holdfast.features.stream import extract
+from holdfast.detection import Head, Model
+from holdfast.detection.features import extract
 from holdfast.io import load_dataset
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
-from holdfast.model import Head, Model
 from holdfast.recordings import Recording
 from holdfast.resampling import true_updates
 from holdfast.sensors.types import Array, Integers

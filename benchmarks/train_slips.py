@@ -31,13 +31,11 @@ import msgspec
 import numpy as np
 from hand_handling import NORMALISED_BY, moments_by, read_grasp
 
-from holdfast.classifiers import Linear
-from holdfast.features import FeatureSpec, Tare
-from holdfast.features.specs import SLIP_FEATURES
+from holdfast.detection import FeatureSpec, Head, Linear, Model, Tare
+from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
 from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
-from holdfast.model import Head, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset

@@ -181,31 +181,6 @@ class TestWithFaults:
         assert list(found) == [fault for fault in Fault if fault in before or fault in more]
 
 
-@given(
-    st.lists(st.lists(st.sampled_from(list(ContactState)), min_size=2, max_size=2), max_size=20),
-    st.integers(0, 20),
-    st.sampled_from([0.0, 0.1, 0.25]),
-)
-def test_changes_of_state_are_the_same_by_sample_and_in_chunks(states, cut, min_duration):
-    times = 0.1 * np.arange(len(states))
-    codes = np.array([[one.code for one in row] for row in states], dtype=np.int8).reshape(-1, 2)
-    by_sample = StateChanges(("a", "hand"), min_duration)
-    expected = [
-        event
-        for time, row in zip(times.tolist(), states, strict=True)
-        for event in by_sample.update(row, time)
-    ]
-    in_chunks = StateChanges(("a", "hand"), min_duration)
-    found = in_chunks.update_chunk(times[:cut], codes[:cut])
-    found += in_chunks.update_chunk(times[cut:], codes[cut:])
-    assert found == expected
-    previous = {"a": ContactState.UNKNOWN, "hand": ContactState.UNKNOWN}
-    for event in expected:
-        assert event.previous is previous[event.finger]
-        assert event.state is not event.previous
-        previous[event.finger] = event.state
-
-
 STATES_OF_A_FINGER = st.lists(st.sampled_from(list(ContactState)), min_size=1, max_size=60)
 PERIOD = 0.01
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from holdfast.detection import Model
 from holdfast.errors import ModelError, RecordingError
 from holdfast.io import load_labels
-from holdfast.model import Model
 from holdfast.sensors import Sensor
 from holdfast.twin.objects import load_objects
 

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-DETECTING = ("holdfast.model", "holdfast.detector", "holdfast.live.stream_detector")
+DETECTING = ("holdfast.detection", "holdfast.live.stream_detector")
 OF_EXTRAS = (
     "jinja2", "joblib", "matplotlib", "mujoco", "optuna", "pyarrow", "scipy", "sklearn",
 )  # fmt: skip
@@ -22,7 +22,9 @@ def run(module):
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
 
 
-@pytest.mark.parametrize("module", [*DETECTING, "holdfast.metrics", "holdfast.classifiers"])
+@pytest.mark.parametrize(
+    "module", [*DETECTING, "holdfast.metrics", "holdfast.training.classifiers"]
+)
 def test_to_detect_no_package_of_an_extra_is_needed(module):
     assert run(module).stderr == ""
 

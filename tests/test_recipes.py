@@ -168,7 +168,7 @@ import sys
 from dataclasses import replace
 import numpy as np
 from holdfast import Model, fingertip_force, load_recording
-from holdfast.features.stream import extract
+from holdfast.detection.features import extract
 
 model, recording = Model.load(sys.argv[1]), load_recording(sys.argv[2])
 assert [str(spec) for spec in model.finger("thumb").features] == ["F_a", "shear"]
@@ -189,7 +189,7 @@ for finger, module in recording.modules.items():
 def test_add_a_feature(copy_of, tmp_path):
     copy = copy_of("Add a feature")
     copy.change(
-        "holdfast/features/specs.py",
+        "holdfast/detection/specs.py",
         ('        # The change of F_tip, and its',
          '        FeatureKind("shear", "force", "sample"),\n'
          '        # The change of F_tip, and its'),

@@ -4,11 +4,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from holdfast.contact import ContactState
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.devices.sources.base import Arrival
 from holdfast.errors import StreamError
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.model import Model
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import (
     Resampler,

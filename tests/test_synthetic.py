@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
-from holdfast.features import fingertip_force, haar_features
+from holdfast.detection import fingertip_force, haar_features
 from holdfast.synthetic import SYNTHETIC_RATE, synthetic_recording
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmark_script import load
-from holdfast.features import DEFAULT_WINDOW, haar_features
+from holdfast.detection import DEFAULT_WINDOW, haar_features
 
 pytestmark = pytest.mark.slow
 

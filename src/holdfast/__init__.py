@@ -20,8 +20,13 @@ if TYPE_CHECKING:
     from holdfast.contact import Fault as Fault
     from holdfast.contact import HandEstimate as HandEstimate
     from holdfast.contact import Reason as Reason
-    from holdfast.detector import Detector as Detector
-    from holdfast.detector import detect as detect
+    from holdfast.detection import FEATURE_NAMES as FEATURE_NAMES
+    from holdfast.detection import Detector as Detector
+    from holdfast.detection import Model as Model
+    from holdfast.detection import detect as detect
+    from holdfast.detection import features_frame as features_frame
+    from holdfast.detection import fingertip_force as fingertip_force
+    from holdfast.detection import haar_features as haar_features
     from holdfast.devices.sources import Arrival as Arrival
     from holdfast.devices.sources import Source as Source
     from holdfast.devices.sources import open_source as open_source
@@ -35,17 +40,12 @@ if TYPE_CHECKING:
     from holdfast.errors import StreamError as StreamError
     from holdfast.errors import TrainingError as TrainingError
     from holdfast.exporters import export as export
-    from holdfast.features import FEATURE_NAMES as FEATURE_NAMES
-    from holdfast.features import features_frame as features_frame
-    from holdfast.features import fingertip_force as fingertip_force
-    from holdfast.features import haar_features as haar_features
     from holdfast.io import load_dataset as load_dataset
     from holdfast.io import load_recording as load_recording
     from holdfast.io import save_recording as save_recording
     from holdfast.live.stream_detector import StreamDetector as StreamDetector
     from holdfast.metrics import event_metrics as event_metrics
     from holdfast.metrics import sample_metrics as sample_metrics
-    from holdfast.model import Model as Model
     from holdfast.recordings import Label as Label
     from holdfast.recordings import Recording as Recording
     from holdfast.recordings import Tactile as Tactile
@@ -61,13 +61,19 @@ if TYPE_CHECKING:
     from holdfast.training import train as train
 
 _NAMES = {
-    "features": ("FEATURE_NAMES", "features_frame", "fingertip_force", "haar_features"),
     "sensors": ("Hand", "Sensor", "sensor"),
     "recordings": ("Label", "Recording", "Tactile", "Truth"),
     "exporters": ("export",),
     "io": ("load_dataset", "load_recording", "save_recording"),
-    "model": ("Model",),
-    "detector": ("Detector", "detect"),
+    "detection": (
+        "FEATURE_NAMES",
+        "Detector",
+        "Model",
+        "detect",
+        "features_frame",
+        "fingertip_force",
+        "haar_features",
+    ),
     "contact": (
         "Cause",
         "ContactEstimate",

@@ -229,7 +229,7 @@ LASTING_DURATION = 0.1
 
 
 class StateChanges:
-    """Memory of several contact states that finds their changes, by sample or in chunks.
+    """Memory of several contact states that finds their changes.
 
     With a minimum duration, it finds only changes that lasted, without flicker: a change is
     found when the new state has lasted so long, with the time at which it began. A state that
@@ -253,8 +253,6 @@ class StateChanges:
         >>> (event,) = changes.update([ContactState.STABLE], time=0.1)
         >>> event.finger, event.state.value, event.previous.value, event.time
         ('thumb', 'STABLE', 'UNKNOWN', 0.1)
-        >>> len(changes.update_chunk(np.array([0.2, 0.3]), np.array([[STABLE], [UNSTABLE]])))
-        1
 
         Only a change that lasted:
 
@@ -305,38 +303,6 @@ class StateChanges:
         event = ContactEvent(self._names[index], state, self.states[index], time)
         self.states[index] = state
         return event
-
-    def update_chunk(
-        self, times: npt.NDArray[np.float64], codes: npt.NDArray[np.integer[Any]]
-    ) -> list[ContactEvent]:
-        """Return all changes within consecutive samples, oldest first.
-
-        Args:
-            times: (n,) of the samples [s].
-            codes: (n, n_names) codes of the states.
-        """
-        if self._min_duration:
-            return [
-                event
-                for time, row in zip(times.tolist(), codes.tolist(), strict=True)
-                for event in self._update_lasting([_STATES[code] for code in row], time)
-            ]
-        if not len(times):
-            return []
-        # The states of the chunk before come first: a change at its first sample counts, too.
-        codes = np.vstack([[state.code for state in self.states], codes])
-        rows, columns = np.nonzero(codes[1:] != codes[:-1])
-        self.states = [_STATES[code] for code in codes[-1]]
-        return [
-            ContactEvent(self._names[column], _STATES[new], _STATES[old], time)
-            for column, new, old, time in zip(
-                columns.tolist(),
-                codes[rows + 1, columns].tolist(),
-                codes[rows, columns].tolist(),
-                times[rows].tolist(),
-                strict=True,
-            )
-        ]
 
 
 MIN_HOLDING_FINGERS = 2

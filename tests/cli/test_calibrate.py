@@ -6,10 +6,10 @@ import msgspec
 import pytest
 
 from command_line import Verb
+from holdfast.detection import Model
 from holdfast.devices import sources
 from holdfast.devices.sources.replay import ReplaySource
 from holdfast.io import load_recording, save_recording
-from holdfast.model import Model
 from holdfast.training import calibrate
 from training.build import handling_recording, normalised_model
 

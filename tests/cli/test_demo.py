@@ -13,8 +13,8 @@ import pytest
 from command_line import Verb
 from holdfast import twin_recordings
 from holdfast.cli import demo as verb
+from holdfast.detection import Model
 from holdfast.io import load_dataset
-from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from command_line import Verb
+from holdfast.detection import Model
 from holdfast.io import load_dataset, load_recording, save_recording
-from holdfast.model import Model
 from holdfast.training import evaluate
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from holdfast.cli import main
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.io import load_dataset, save_recording
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
 

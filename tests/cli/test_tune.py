@@ -4,9 +4,8 @@ import re
 import pytest
 
 from command_line import Verb
-from holdfast.features import parse_features
+from holdfast.detection import Model, parse_features
 from holdfast.io import save_recording
-from holdfast.model import Model
 from holdfast.training import Setting, train
 from training.build import sliding_recording
 

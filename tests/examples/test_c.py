@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from holdfast.detection import Model
 from holdfast.exporters import fingers_of_sensor, header_of
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 
 pytestmark = pytest.mark.skipif(

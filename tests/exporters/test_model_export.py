@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 import holdfast
-from detector.build import model as small_model
-from exporters.models import HAND, PATCH, TIP, built_in, paper
+from detection.detector.build import model as small_model
+from detection.models import HAND, PATCH, TIP, built_in, paper
 from holdfast.errors import ModelError
 from holdfast.exporters import export, fingers_of_sensor
 from holdfast.synthetic import synthetic_recording

@@ -2,10 +2,9 @@
 
 import numpy as np
 
-from holdfast.features import Tare
-from holdfast.features.specs import KINDS, RELATIVE_KINDS, FeatureSpec, kinds_of
-from holdfast.features.start import Start
-from holdfast.features.tables import StreamPlan
+from holdfast.detection import Tare
+from holdfast.detection.plan import Start, StreamPlan
+from holdfast.detection.specs import KINDS, RELATIVE_KINDS, FeatureSpec, kinds_of
 from holdfast.sensors import Sensor
 
 RATES = (20.0, 60.0, 150.0, 500.0, 1000.0)

@@ -19,14 +19,14 @@ ROTATIONS = np.random.default_rng(3).normal(size=(5, 3, 3))
 def features(force=FORCE, out=None, window=WINDOW, first=0, stop=None):
     last = len(force) if stop is None else stop
     out = np.zeros((N if stop is not None else last, 6)) if out is None else out
-    _extension.haar_features(force, window, first, last, out)
+    _extension.haar_features(force, out, first, last, window)
     return out
 
 
 def forces(readings=READINGS, baseline=BASELINE, rotations=ROTATIONS, out=None, first=0, stop=None):
     out = np.zeros((len(readings), 3)) if out is None else out
     last = len(readings) if stop is None else stop
-    _extension.fingertip_force(readings, baseline, rotations, first, last, out)
+    _extension.fingertip_force(readings, baseline, rotations, out, first, last)
     return out
 
 
@@ -163,8 +163,8 @@ def test_arrays_that_share_memory_are_refused():
 def test_numbers_out_of_range_are_refused(window, first, stop):
     with pytest.raises(ValueError) as raised:
         features(window=window, first=first, stop=stop)
-    expected = f"window {window}, samples {first} to {stop} of {N} given"
-    assert str(raised.value) == expected
+    wrong = f"window {window}" if window != WINDOW else f"samples {first} to {stop} of {N}"
+    assert str(raised.value) == f"{wrong} given"
 
 
 @pytest.mark.parametrize(("first", "stop"), [(-1, 1), (2, 1), (0, 41)])
@@ -189,7 +189,7 @@ def test_other_types_of_numbers_are_refused(number):
 
 @pytest.mark.parametrize("n", [0, 1, 4, 6])
 def test_the_number_of_arguments_is_checked(n):
-    arguments = (FORCE, WINDOW, 0, N, np.zeros((N, 6)), None)
+    arguments = (FORCE, np.zeros((N, 6)), 0, N, WINDOW, None)
     with pytest.raises(TypeError, match=f"{n} given"):
         _extension.haar_features(*arguments[:n])
     with pytest.raises(TypeError, match="6 arguments"):
@@ -219,9 +219,9 @@ def test_taxels_that_do_not_fit_are_refused(arguments, message):
 def test_buffers_are_released():
     force, out = bytearray(FORCE[:20].tobytes()), bytearray(20 * 48)
     views = memoryview(force).cast("d", (20, 3)), memoryview(out).cast("d", (20, 6))
-    _extension.haar_features(views[0], WINDOW, 0, 20, views[1])
+    _extension.haar_features(*views, 0, 20, WINDOW)
     with pytest.raises(ValueError):
-        _extension.haar_features(views[0], 3, 0, 20, views[1])
+        _extension.haar_features(*views, 0, 20, 3)
     for view in views:
         view.release()
     force.clear()  # is refused while a buffer is in use

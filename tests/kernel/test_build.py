@@ -71,7 +71,7 @@ def test_a_wheel_has_the_c_files_that_an_exported_header_joins(clone):
     folder = clone / "installed"
     with zipfile.ZipFile(next((clone / "dist").glob("*.whl"))) as wheel:
         wheel.extractall(folder / "src")
-    shown = python(folder, "from holdfast.exporters import c_header as c; print(c.kernel_text())")
+    shown = python(folder, "from holdfast.detection import c_header as c; print(c.kernel_text())")
     assert "holdfast_detect(" in shown.stdout, shown.stderr
     assert not (folder / "src" / "holdfast" / "kernel" / "module.c").exists()
 

@@ -1,19 +1,22 @@
 """The detector of the extension: chunks, its estimates, and rules that do not fit."""
 
 import copy
+import gc
 import pickle
 import threading
+import weakref
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from detector.build import cause_head, lively, model
+from detection.detector.build import cause_head, lively, model
 from holdfast.contact import Cause
-from holdfast.detector import Detector
-from holdfast.detector.tables import ESTIMATE, rules_of
-from holdfast.exporters.c_header import ctypes_of, kernel_text, structs_of
+from holdfast.detection import Detector
+from holdfast.detection.kernel_config import model_config, packed, stream_config
+from holdfast.detection.traces import EstimateTypes
 from holdfast.kernel import _extension
+from holdfast.kernel.structs import struct_type
 
 N = 3000
 EVERY_CAUSE = tuple(Cause)
@@ -28,6 +31,13 @@ def with_causes(**options):
     }
     debounce = replace(made_model.debounce, switching=15.0, hysteresis=0.1, hold=0.05)
     return replace(made_model, fingers=fingers, debounce=debounce)
+
+
+def made_kernel(plan, note):
+    """A detector of the extension that calls `note` at each change of state."""
+    config = *packed(stream_config(plan)), plan.baseline.tobytes()
+    types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)}, note)
+    return _extension.Detector(*config, *packed(model_config(with_causes(), plan)), types)
 
 
 class TestEstimates:
@@ -65,17 +75,8 @@ class TestEstimates:
             _extension.Estimates()["thumb"]
 
     def test_they_have_the_layout_of_the_struct(self):
-        assert _extension.Estimates.__itemsize__ == ESTIMATE.itemsize
-        fields = {"estimate": structs_of(kernel_text())["holdfast_finger_estimate"]}
-        struct = ctypes_of(fields, {}, single=False)["estimate"]
-        offsets = {name: getattr(struct, name).offset for name, *_ in struct._fields_}
-        short = {
-            "faulty_taxels": "taxels", "stable_probability": "probability",
-            "slip_probability": "slip", "slip_speed": "speed", "slip_distance": "distance",
-            "instability": "sigma",
-        }  # fmt: skip
-        expected = {short.get(name, name): offset for name, offset in offsets.items()}
-        assert {name: ESTIMATE.fields[name][1] for name in ESTIMATE.names} == expected
+        kind = struct_type("holdfast_finger_estimate")
+        assert _extension.Estimates.__itemsize__ == kind.itemsize
 
 
 class TestDetector:
@@ -88,7 +89,7 @@ class TestDetector:
         detector, refused, n = Detector(with_causes())._kernel, [], 20_000
         arguments = [
             np.ones((n, 4, 3)), np.ones((n, 2), dtype=bool), np.arange(float(n)),
-            np.zeros((n, 2, ESTIMATE.itemsize // 8)), np.zeros(n),
+            np.zeros((n, 2 * _extension.Estimates.__itemsize__ // 8)), np.zeros(n),
         ]  # fmt: skip
         for _ in range(50):  # until a call was made while the thread was inside one
             thread = threading.Thread(target=detector.run, args=arguments)
@@ -105,50 +106,62 @@ class TestDetector:
         assert set(refused) == {"another thread is using this detector"}
 
     @pytest.mark.parametrize(
-        ("change", "wrong"),
+        ("finger", "head", "field", "value", "wrong"),
         [
-            (lambda r, h, w: (r[:1], h, w), "lists of a rule and four heads"),
-            (lambda r, h, w: (r, h, w[:-1]), "first of a head"),
-            (lambda r, h, w: (r, h, w * np.nan), "a weight of a head"),
-            (lambda r, h, w: (r, [h[0] | {"n_features": 99}, *h[1:]], w), "n_features or has_sq"),
-            (lambda r, h, w: (r, [h[0] | {"n_outputs": 0}, *h[1:]], w), "n_outputs of a head"),
-            (lambda r, h, w: (r, [h[0] | {"gain": np.nan}, *h[1:]], w), "a number of a head"),
-            (lambda r, h, w: (r, [*h[:3], h[3] | {"causes": [9] * 6}, *h[4:]], w), "causes of"),
-            (lambda r, h, w: ([r[0] | {"contact": 4}, r[1]], h, w), "contact or contact_limit"),
-            (lambda r, h, w: ([r[0] | {"contact": 3}, r[1]], h, w), "contact by the load of a"),
+            (0, 0, "first", 99, "first of a head"),
+            (0, 0, "n_features", 99, "n_features or has_squares of a head"),
+            (0, 0, "n_outputs", 0, "n_outputs of a head"),
+            (1, 0, "gain", np.nan, "a number of a head"),
+            (1, 3, "causes", 9, "causes of a head"),
+            (0, None, "contact", 4, "contact or contact_limit of a finger"),
+            (1, None, "contact", 3, "contact by the load of a hand without lags"),
         ],
     )
-    def test_rules_that_do_not_fit_are_refused(self, change, wrong):
+    def test_rules_that_do_not_fit_are_refused(self, finger, head, field, value, wrong):
         used = with_causes()
         detector = Detector(used)
+        _, rules, weights = model_config(used, detector._plan)
+        (rules[finger] if head is None else rules[finger]["heads"][head])[field] = value
         with pytest.raises(ValueError, match=wrong):
-            detector._kernel.set_rules(*change(*rules_of(used, detector._stream.plan)))
-
-    def test_a_list_that_a_number_cuts_is_refused(self):
-        used = with_causes()
-        detector = Detector(used)._kernel
-        rules, heads, weights = rules_of(used, Detector(used)._stream.plan)
-
-        class Cutting:
-            def __float__(self):
-                heads.clear()
-                return 1.0
-
-        heads[0] = heads[0] | {"gain": Cutting()}
-        with pytest.raises(IndexError):
-            detector.set_rules(rules, heads, weights)
-
-    def test_a_number_cannot_call_the_detector(self):
-        used = with_causes()
-        detector = Detector(used)._kernel
-        rules, heads, weights = rules_of(used, Detector(used)._stream.plan)
-
-        class Calling:
-            def __float__(self):
-                detector.update({}, 1.0)
-                return 1.0
-
-        heads[0] = heads[0] | {"gain": Calling()}
-        with pytest.raises(RuntimeError, match="another thread"):
-            detector.set_rules(rules, heads, weights)
+            detector._kernel.set_rules(rules.tobytes(), weights.tobytes())
         assert detector.update({}, 1.0) is not None
+
+    @pytest.mark.parametrize("n_rules", [1, 3])
+    def test_rules_of_other_fingers_are_refused(self, n_rules):
+        used = with_causes()
+        detector = Detector(used)
+        _, rules, weights = model_config(used, detector._plan)
+        other = np.concatenate([rules, rules])[:n_rules]
+        with pytest.raises(ValueError, match="rules: "):
+            detector._kernel.set_rules(other.tobytes(), weights.tobytes())
+        with pytest.raises(ValueError, match="weights: "):
+            detector._kernel.set_rules(rules.tobytes(), weights[:-1].tobytes())
+        with pytest.raises(ValueError, match="a weight of a head"):
+            detector._kernel.set_rules(rules.tobytes(), (weights * np.nan).tobytes())
+
+    def test_a_change_cannot_call_the_detector(self):
+        detector = Detector(with_causes())
+        refused = []
+
+        def note(change):
+            try:
+                kernel.update({}, 99.0)
+            except RuntimeError as error:
+                refused.append(str(error))
+
+        kernel = made_kernel(detector._plan, note)
+        for k, sample in enumerate(lively(60)):
+            kernel.update({"thumb": sample, "index": sample}, k / 100)
+        assert set(refused) == {"another thread is using this detector"}
+
+    def test_a_cycle_through_what_it_calls_is_collected(self):
+        class Note:
+            def __call__(self, change):
+                pass
+
+        note = Note()
+        note.kernel = made_kernel(Detector(with_causes())._plan, note)
+        dead = weakref.ref(note)
+        del note
+        gc.collect()
+        assert dead() is None

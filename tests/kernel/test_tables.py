@@ -1,12 +1,10 @@
-import copy
-
 import numpy as np
 import pytest
 
-from holdfast.features import Tare
-from holdfast.features.specs import ANY_FEATURES, HOLDFAST_FEATURES
-from holdfast.features.stream import FeatureStream
-from holdfast.features.tables import StreamPlan, stream_tables
+from holdfast.detection import Tare
+from holdfast.detection.kernel_config import packed, stream_config
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import ANY_FEATURES, HOLDFAST_FEATURES
 from holdfast.kernel import _extension
 from holdfast.sensors import sensor
 
@@ -15,25 +13,29 @@ HUGE = 2**64 - 1
 
 
 @pytest.fixture
-def stream():
+def plan():
     features = (*HOLDFAST_FEATURES, *ANY_FEATURES)
-    plan = StreamPlan(
+    return StreamPlan(
         {"one": PATCH, "two": PATCH}, {"one": features, "two": features}, 14, Tare.parse("0.5"), 100
     )
-    return FeatureStream(plan)
 
 
 FIRST_RELATIVE = len(HOLDFAST_FEATURES)
-PLACES = {"fingers": 1, "features": 2, "lags": 3, "used": 4, "rotations": 5, "places": 6}
 
 
-def refused(stream, change):
-    """Return what the kernel says of tables that a function has changed."""
-    tables = copy.deepcopy(list(stream.tables()))
-    change(tables)
+def refused(plan, field, value):
+    """Return what the kernel says of constants of which one is another."""
+    config = stream_config(plan)
+    *names, last = field.split(".")
+    if names[1:]:
+        getattr(config, names[0])[int(names[1])][last] = value
+    elif names:
+        getattr(config, names[0])[int(last)] = value
+    else:
+        config.hand[0][last] = value
     with pytest.raises(ValueError) as raised:
-        _extension.Stream(*tables)
-    return str(raised.value).removeprefix("tables that do not fit: ")
+        _extension.Stream(*packed(config), plan.baseline.tobytes())
+    return str(raised.value).removeprefix("constants that do not fit: ")
 
 
 class TestCheck:
@@ -91,20 +93,12 @@ class TestCheck:
             ("places.5", np.nan, "a rotation or a place of a taxel"),
         ],
     )
-    def test_what_does_not_fit_is_named(self, stream, field, value, wrong):
-        def change(tables):
-            *names, last = field.split(".")
-            place = tables[PLACES[names[0]]] if names else tables[0]
-            for name in names[1:]:
-                place = place[int(name)]
-            place[int(last) if last.isdigit() else last] = value
-
-        assert refused(stream, change) == wrong
+    def test_what_does_not_fit_is_named(self, plan, field, value, wrong):
+        assert refused(plan, field, value) == wrong
 
     def test_bridged_gaps_need_lags(self):
         plan = StreamPlan({"one": PATCH}, {"one": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
-        wrong = refused(FeatureStream(plan), lambda tables: tables[1][0].update(bridges=True))
-        assert wrong == "bridges of a finger without lags"
+        assert refused(plan, "fingers.0.bridges", True) == "bridges of a finger without lags"
 
     def test_a_padding_has_no_scope(self):
         plan = StreamPlan(
@@ -113,13 +107,9 @@ class TestCheck:
             14, Tare.parse("first"), 100,
         )  # fmt: skip
         place = len(HOLDFAST_FEATURES) + 1
-        assert stream_tables(plan)[2][place]["kind"] == -1
+        assert stream_config(plan).features[place]["kind"] == -1
+        assert refused(plan, f"features.{place}.of_hand", True) == "of_hand of a padding"
 
-        def change(tables):
-            tables[2][place] = tables[2][place] | {"of_hand": True}
-
-        assert refused(FeatureStream(plan), change) == "of_hand of a padding"
-
-    def test_normals_are_finite(self, stream):
-        wrong = refused(stream, lambda tables: tables[1][1].update({"normal[2]": np.inf}))
-        assert wrong == "normal or max_field of a finger"
+    def test_normals_are_finite(self, plan):
+        normal = (0.0, 1.0, np.inf)
+        assert refused(plan, "fingers.1.normal", normal) == "normal or max_field of a finger"

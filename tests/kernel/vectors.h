@@ -1,13 +1,13 @@
 /* Written by write_vectors.py; do not edit. */
 #ifdef HOLDFAST_VECTORS_FIXED
 #define HOLDFAST_N_FINGERS 2
+#define HOLDFAST_N_LANES 12
 #define HOLDFAST_N_FEATURES 26
 #define HOLDFAST_N_LAGS 1
 #define HOLDFAST_N_HISTORY 14
 #define HOLDFAST_N_CHANNELS 4
 #define HOLDFAST_N_LEVELS 3
 #define HOLDFAST_N_TRACK 13
-#define HOLDFAST_N_LANES 12
 #define HOLDFAST_N_TAXELS 9
 #endif
 #include "holdfast.c"

@@ -15,22 +15,25 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from detector.build import cause_head, finger_model, speed_head, squared_head
+
+from detection.detector.build import cause_head, finger_model, speed_head, squared_head
 from holdfast.contact import Cause
-from holdfast.detector import tables
-from holdfast.detector.detection import makers
-from holdfast.exporters.c_header import Tables, kernel_text
-from holdfast.features.specs import RELATIVE_KINDS, FeatureSpec
-from holdfast.features.stream import FeatureStream
+from holdfast.detection import Debounce, Model
+from holdfast.detection.c_header import Tables, kernel_text
+from holdfast.detection.kernel_config import model_config, packed, stream_config
+from holdfast.detection.specs import RELATIVE_KINDS, FeatureSpec
+from holdfast.detection.traces import EstimateTypes
 from holdfast.kernel import _extension
-from holdfast.model import Debounce, Model
+from holdfast.kernel.structs import struct_type
 from holdfast.sensors import Sensor
 
 RATE, N_SAMPLES, EVERY = 30.0, 260, 10
 """Samples per second [Hz], their number, and the distance of those whose features are written."""
 LINE = 100
-CODES = ("state", "reason", "cause", "faults", "taxels")
-NUMBERS = ("probability", "slip", "speed", "distance", "sigma")
+CODES = ("state", "reason", "cause", "faults", "faulty_taxels")
+NUMBERS = (
+    "stable_probability", "slip_probability", "slip_speed", "slip_distance", "instability",
+)  # fmt: skip
 
 
 def model():
@@ -110,17 +113,15 @@ def array(kind, name, rows):
 def estimates_of(used, plan, rows):
     """Return what the kernel computes: features, and estimates of the fingers."""
     readings, present, times = (np.array(column) for column in zip(*rows, strict=True))
-    stream = FeatureStream(plan)
+    config = *packed(stream_config(plan)), plan.baseline.tobytes()
     features = np.empty((*present.shape, plan.width))
-    stream.start().advance(readings, present, times, features, np.empty(present.shape))
-    parts = [used.finger(name) for name in plan.fingers]
-    kernel = _extension.Detector(
-        stream.tables(), tables.model_table(used, plan), *tables.rules_of(used, plan),
-        makers(plan.fingers, parts), np.ndarray, print,
-    )  # fmt: skip
-    estimates, numbers = tables.estimate_rows(*present.shape)
+    _extension.Stream(*config).advance(readings, present, times, features, np.empty(present.shape))
+    indices = {name: index for index, name in enumerate(plan.fingers)}
+    types = EstimateTypes(indices, lambda change: None)
+    kernel = _extension.Detector(*config, *packed(model_config(used, plan)), types)
+    estimates = np.zeros(present.shape, struct_type("holdfast_finger_estimate"))
     hand = np.empty(len(times))
-    kernel.run(readings, present, times, numbers, hand)
+    kernel.run(readings, present, times, estimates.view(np.float64), hand)
     return features, estimates, hand
 
 

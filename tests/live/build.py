@@ -5,10 +5,10 @@ from collections import deque
 
 import numpy as np
 
+from holdfast.detection import Model
 from holdfast.devices.sources.base import Arrival, Source
 from holdfast.devices.sources.base import notice_arrival as make_notice
 from holdfast.io import save_recording
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 
 FINGERS = ("thumb", "index", "middle")

@@ -12,7 +12,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from holdfast.detector import detect
+from holdfast.detection import detect
 from holdfast.devices.sources import open_source
 from holdfast.live.stream_detector import StreamDetector
 

@@ -8,7 +8,7 @@ import pytest
 
 from devices.sources.xela.servers import HANG_UP, free_port, server
 from holdfast.contact import ContactState
-from holdfast.detector import detect
+from holdfast.detection import detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources.xela.encoder import XelaEncoder
 from holdfast.live.session import Session

@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from holdfast.detector import Detector, detect
+from holdfast.detection import Detector, Model, detect
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.model import Model
 from holdfast.recordings import Recording
 
 from . import build

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.io import save_recording
 from holdfast.labelling.review.content import content_of
 from holdfast.labelling.review.findings import faulty_readings, findings_of

@@ -5,7 +5,7 @@ from functools import partial
 
 import pytest
 
-from holdfast.detector import detect
+from holdfast.detection import detect
 from holdfast.errors import ModelError, SourceError, StreamError
 from holdfast.live.session import SWITCH_INTERVAL, InterpreterSettings, Session
 from holdfast.live.stream_detector import StreamDetector

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
-from holdfast.detector import Detector, detect
+from holdfast.detection import Detector, detect
 from holdfast.errors import ModelError, StreamError
 from holdfast.live.source_filter import MAX_BUFFERED_ARRIVALS
 from holdfast.live.stream_detector import StreamDetector

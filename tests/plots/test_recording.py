@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.features import fingertip_force, haar_features
+from holdfast.detection import fingertip_force, haar_features
 from holdfast.plots.recording import plot_recording
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor

@@ -7,9 +7,9 @@ import pytest
 from matplotlib.figure import Figure
 from msgspec.structs import replace as replace_fields
 
+from holdfast.detection import Model
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
-from holdfast.model import Model
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.slips import draw_slips_found, slip_series

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import STABLE
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.plots.time_series import envelope, equal_runs, finger_series
 from holdfast.recordings import Label, Recording, Tactile, Truth
 from holdfast.sensors import sensor

@@ -3,7 +3,7 @@
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
-from holdfast.model import Model
+from holdfast.detection import Model
 from holdfast.recordings import Label, Recording, Tactile, Truth
 from holdfast.sensors import Sensor, flat_sensor
 

@@ -4,9 +4,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Linear, Samples
-from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
+from holdfast.detection import Linear
 from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
+from holdfast.training.classifiers import Samples
+from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
 from holdfast.training.finger_samples import FingerSamples
 
 RIGHT = Linear((0.0, 0.0, 0.0), (1.0, 1.0, 1.0), ((2.0, -1.0, 0.0),), (0.5,))

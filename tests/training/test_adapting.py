@@ -5,9 +5,8 @@ from dataclasses import replace
 import msgspec
 import pytest
 
+from holdfast.detection import ANY_FINGER, Debounce, Tare, parse_features
 from holdfast.errors import ModelError
-from holdfast.features import Tare, parse_features
-from holdfast.model import ANY_FINGER, Debounce
 from holdfast.training import Setting, evaluate, train
 
 from .build import TINY, tiny_recording

@@ -8,9 +8,8 @@ import pytest
 
 import holdfast
 from holdfast.contact import STABLE, UNSTABLE, ContactState
-from holdfast.detector import detect
+from holdfast.detection import Handling, Model, detect
 from holdfast.errors import ModelError, TrainingError
-from holdfast.model import Handling, Model
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import calibrate, calibrate_with_report
 from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed

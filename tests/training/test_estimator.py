@@ -8,7 +8,7 @@ from sklearn.model_selection import GridSearchCV, GroupKFold, cross_val_score
 
 from holdfast import StabilityClassifier
 from holdfast.contact import STABLE
-from holdfast.detector import detect
+from holdfast.detection import detect
 from holdfast.errors import TrainingError
 from holdfast.metrics import sample_metrics
 from holdfast.recordings import label_states

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Phase
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.errors import ModelError
 from holdfast.metrics import hand_decisions
-from holdfast.model import Model
 from holdfast.recordings import Truth
 from holdfast.training import Setting, compute_decisions, evaluate, train
 from holdfast.training.evaluation import combine_decisions, evaluate_recordings

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from detector.build import z_of
-from holdfast.detector import detect
-from holdfast.features import parse_features
-from holdfast.features.specs import SLIP_FEATURES
+from detection.detector.build import z_of
+from holdfast.detection import detect, parse_features
+from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.training import Setting, train
 from holdfast.training.head_fits import MIN_SPEED_SAMPLES, fit_speed
 from holdfast.training.targets import TargetSamples, true_speed

@@ -6,8 +6,7 @@ from msgspec.structs import replace
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.contact import Cause, ContactState
-from holdfast.features import fingertip_force, haar_features, parse_features
-from holdfast.model import ANY_FINGER, Head
+from holdfast.detection import ANY_FINGER, Head, fingertip_force, haar_features, parse_features
 from holdfast.recordings import Label
 from holdfast.training import Setting, calibrate, train
 from holdfast.training.head_fits import CAUSE_PENALTY, fit_causes

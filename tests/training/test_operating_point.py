@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from detector.build import finger_model, slip_head
+from detection.detector.build import finger_model, slip_head
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN
+from holdfast.detection import Debounce
 from holdfast.errors import TrainingError
 from holdfast.metrics import Decisions, FingerDecisions
 from holdfast.metrics.slip_truth import SlipDecisions
-from holdfast.model import Debounce
 from holdfast.training.operating_point import (
     STABLE_SHARE,
     GraspingFinger,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from detector.build import sensor
+from detection.detector.build import sensor
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import TrainingError
 from holdfast.recordings import Recording, Tactile

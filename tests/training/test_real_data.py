@@ -2,7 +2,7 @@
 
 import pytest
 
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.io.importers import import_recordings
 from holdfast.training import Setting, train
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
+from holdfast.detection import ANY_FINGER, Debounce, Tare, parse_features
 from holdfast.errors import TrainingError
-from holdfast.features import Tare, parse_features
-from holdfast.model import ANY_FINGER, Debounce
 from holdfast.sensors import sensor
 from holdfast.training import Setting, train
 from holdfast.training.dataset_scan import scan_dataset

@@ -5,9 +5,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import STABLE
-from holdfast.features import parse_features
+from holdfast.detection import Debounce, parse_features
 from holdfast.metrics import match_decisions
-from holdfast.model import Debounce
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.replay import ThresholdReplay
 

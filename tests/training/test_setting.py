@@ -1,7 +1,7 @@
 import pytest
 
-from holdfast.features.specs import ANY_FEATURES, SLIP_FEATURES
-from holdfast.model import Debounce, Model
+from holdfast.detection import Debounce, Model
+from holdfast.detection.specs import ANY_FEATURES, SLIP_FEATURES
 from holdfast.training import Setting
 
 

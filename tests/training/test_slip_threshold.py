@@ -6,17 +6,16 @@ import msgspec
 import numpy as np
 import pytest
 
-from detector.build import z_of
-from holdfast.classifiers.fitting import Samples
-from holdfast.classifiers.logreg import LogisticRegression
+from detection.detector.build import z_of
 from holdfast.contact import ContactState
+from holdfast.detection import Model, parse_features
 from holdfast.errors import ModelError, TrainingError
-from holdfast.features import parse_features
 from holdfast.metrics import summarise
 from holdfast.metrics.slip_thresholds import MAX_RAISED_QUIET, slip_curve
 from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTruth
-from holdfast.model import Model
 from holdfast.training import Setting, compute_decisions, train
+from holdfast.training.classifiers.fitting import Samples
+from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast.training.evaluation import combine_decisions
 from holdfast.training.head_fits import (
     MIN_SLIDING_SAMPLES,

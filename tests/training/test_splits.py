@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
+from holdfast.training.classifiers import Samples
 from holdfast.training.dataset_scan import ScannedRecording
 from holdfast.training.splits import (
     RANDOM_FOLDS,

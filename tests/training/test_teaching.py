@@ -8,12 +8,12 @@ import pytest
 
 from holdfast import teach
 from holdfast.contact import Cause, ContactState
+from holdfast.detection import Model
+from holdfast.detection.specs import TAUGHT_FEATURES
 from holdfast.errors import TrainingError
-from holdfast.features.specs import TAUGHT_FEATURES
 from holdfast.io import load_dataset, save_recording
 from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, choose_threshold, weighted_threshold
 from holdfast.metrics.slips import SlipCounts, SlipCurve
-from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Label
 from holdfast.training import evaluate, teach_with_report, teaching
@@ -80,7 +80,7 @@ class TestModel:
 
 
 def _handling(location, scale):
-    from holdfast.model import Handling
+    from holdfast.detection import Handling
 
     return Handling(location=tuple(location), scale=tuple(scale), seconds=30.0)
 

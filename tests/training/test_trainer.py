@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Fitted, Linear, Samples, recipe
 from holdfast.contact import STABLE, UNSTABLE, ContactState
+from holdfast.detection import Linear, Tare, parse_features
 from holdfast.errors import TrainingError
-from holdfast.features import Tare, parse_features
 from holdfast.metrics import summarise
 from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions, train, trainer
+from holdfast.training.classifiers import Fitted, Samples, recipe
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import fit_model
 from holdfast.training.splits import split_data

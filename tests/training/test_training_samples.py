@@ -8,9 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.contact import STABLE, ContactState
+from holdfast.detection import ANY_FINGER, Tare, fingertip_force, haar_features, parse_features
 from holdfast.errors import TrainingError
-from holdfast.features import Tare, fingertip_force, haar_features, parse_features
-from holdfast.model import ANY_FINGER
 from holdfast.recordings import Recording
 from holdfast.training import Setting
 from holdfast.training.dataset_scan import scan_dataset

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
+from holdfast.detection import Debounce, Model, parse_features
 from holdfast.errors import ModelError, TrainingError
-from holdfast.features import parse_features
 from holdfast.metrics import summarise
-from holdfast.model import Debounce, Model
 from holdfast.training import Setting, compute_decisions, train, tune
 
 from .build import tiny_recording

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples, recipe
+from holdfast.training.classifiers import Samples, recipe
 from holdfast.training.splits import inner_folds
 from holdfast.training.tuning import search
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause, ContactState, Phase
-from holdfast.features import fingertip_force
+from holdfast.detection import fingertip_force
 from holdfast.twin import hand, simulation
 from holdfast.twin.objects import OTHER_OBJECTS, object_named
 from holdfast.twin.profile import profile

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holdfast.features import fingertip_force
+from holdfast.detection import fingertip_force
 from holdfast.io import import_recordings
 from holdfast.sensors import sensor
 from holdfast.twin.steps import saturated

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.fitting import (
+from holdfast.detection.heads import Linear
+from holdfast.training.classifiers.fitting import (
     Fitted,
     Parameters,
     Samples,
@@ -14,7 +15,6 @@ from holdfast.classifiers.fitting import (
     sigmoid,
     standardise,
 )
-from holdfast.classifiers.linear import Linear
 
 if TYPE_CHECKING:
     from optuna import Trial

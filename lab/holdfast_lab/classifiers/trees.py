@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.fitting import (
+from holdfast.detection.heads import feature_rows
+from holdfast.sensors.types import Array
+from holdfast.training.classifiers.fitting import (
     Parameters,
     Samples,
     check_classes,
     class_ratio,
     undo_balancing,
 )
-from holdfast.classifiers.linear import feature_rows
-from holdfast.sensors.types import Array
 
 if TYPE_CHECKING:
     from optuna import Trial

@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import STABLE, UNKNOWN
+from holdfast.detection import Tare
 from holdfast.errors import RecordingError, TrainingError
-from holdfast.features import Tare
 from holdfast.io import Dataset, load_dataset
 from holdfast.metrics.truth_labels import fingers_with_truth
 from holdfast.recordings import Recording

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from functools import cache
 
-from holdfast.detector import Detector
+from holdfast.detection import Detector, Model
 from holdfast.errors import ModelError
-from holdfast.model import Model
 from holdfast.sensors import sensor
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.plant import MILD, plant_named

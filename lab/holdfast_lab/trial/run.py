@@ -10,8 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import CONTACT_FORCE, SLIP_SPEED
-from holdfast.detector import Detector
-from holdfast.model import Model
+from holdfast.detection import Detector, Model
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT, NEWTONS_PER_SHEAR_COUNT
 from holdfast.twin.grasp import GRASP_DIRECTION

@@ -53,7 +53,7 @@ def study(
     """
     from msgspec import json
 
-    from holdfast.features import Tare
+    from holdfast.detection import Tare
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.report.terminal import PRINTED_COLUMNS, print_main_table
     from holdfast_lab.study.corpora import plan_study

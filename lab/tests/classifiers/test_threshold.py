@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
+from holdfast.training.classifiers import Samples
 from holdfast_lab.classifiers.threshold import Threshold, best_cut
 
 pytestmark = pytest.mark.slow

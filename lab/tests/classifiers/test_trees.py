@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples
 from holdfast.errors import TrainingError
+from holdfast.training.classifiers import Samples
 from holdfast_lab.classifiers.trees import GradientBoosting
 
 RECIPE = GradientBoosting()

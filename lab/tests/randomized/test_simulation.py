@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
-from holdfast.features import fingertip_force
+from holdfast.detection import fingertip_force
 from holdfast_lab.randomized import simulation
 from holdfast_lab.randomized.drawing import (
     MEASURED,

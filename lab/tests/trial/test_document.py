@@ -52,7 +52,7 @@ def test_it_is_json_without_infinity(document):
 
 
 def test_a_model_file_is_named_without_its_folder(tmp_path):
-    from holdfast.model import Model
+    from holdfast.detection import Model
 
     Model.load("builtin:noise-floor").save(tmp_path / "mine.json")
     plan = TrialPlan(("fixed",), 1, model=str(tmp_path / "mine.json"))

@@ -1,8 +1,8 @@
 import msgspec
 import pytest
 
+from holdfast.detection import Model
 from holdfast.errors import ModelError
-from holdfast.model import Model
 from holdfast_lab.trial.plan import TrialPlan, run_numbered
 
 

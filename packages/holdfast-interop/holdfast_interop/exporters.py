@@ -82,7 +82,7 @@ class Rerun:
     ) -> dict[str, Any]:
         """Write the files, and return how many."""
         require_rerun()
-        from holdfast.model import Model
+        from holdfast.detection import Model
         from holdfast_interop.rerun import exporter
 
         model = None if options.model is None else Model.load(options.model)

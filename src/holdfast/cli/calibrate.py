@@ -73,11 +73,11 @@ def calibrate(
       holdfast calibrate builtin:any xela://auto -o mine.json --seconds 60
       holdfast calibrate builtin:any handling/ -o mine.json --false-alarms 1
     """
+    from holdfast.detection import Model
     from holdfast.devices import sources
     from holdfast.devices.uri import is_uri
     from holdfast.files import refuse_overwrite
     from holdfast.live.handling import record_handling
-    from holdfast.model import Model
     from holdfast.training.calibration import calibrate_with_report, check_normalised
 
     refuse_overwrite(out, force=force)  # before a minute of handling is recorded

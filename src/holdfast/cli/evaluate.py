@@ -58,8 +58,8 @@ def evaluate(
     require_extras("train")
     import msgspec
 
+    from holdfast.detection import Model
     from holdfast.errors import TrainingError
-    from holdfast.model import Model
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict
 

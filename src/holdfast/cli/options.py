@@ -21,10 +21,10 @@ from holdfast.removed import removal
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from holdfast.detection import Model
     from holdfast.devices.sources import Source
     from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.model import Model
     from holdfast.parallel import Engine
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
@@ -246,8 +246,8 @@ class DetectorOptions:
         """
         from msgspec.structs import replace
 
+        from holdfast.detection import Debounce, Model
         from holdfast.devices.uri import is_uri
-        from holdfast.model import Debounce, Model
 
         # Before the model is read, whose message would name a missing file. builtin:any has the
         # form of a URI; a forgotten MODEL is the usual mistake.

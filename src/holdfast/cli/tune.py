@@ -74,8 +74,8 @@ def tune(
       holdfast tune builtin:any recordings/ -o mine.json --false-alarms 0.5 --json
     """
     require_extras("train")
+    from holdfast.detection import Model
     from holdfast.files import refuse_overwrite
-    from holdfast.model import Model
     from holdfast.training import tune as choose
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from holdfast.detection import ANY_FINGER, Model
+from holdfast.detection.c_header import CHeader, header_of
+from holdfast.detection.plan import Start
 from holdfast.errors import ModelError, missing_part
-from holdfast.exporters.c_header import CHeader, header_of
-from holdfast.features.start import Start
 from holdfast.files import refuse_overwrite, write_whole
-from holdfast.model import ANY_FINGER, Model
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor, sensor
 

@@ -1,6 +1,6 @@
 """Functions in C. Those of arrays release the GIL, and refuse all but contiguous float64."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,10 @@ SOURCES: str
 
 def haar_features(
     force: npt.NDArray[np.float64],
-    window: int,
+    out: npt.NDArray[np.float64],
     first: int,
     stop: int,
-    out: npt.NDArray[np.float64],
+    window: int,
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 6) with the features of a force (n, 3)."""
@@ -24,15 +24,27 @@ def fingertip_force(
     readings: npt.NDArray[np.float64],
     baseline: npt.NDArray[np.float64],
     rotations: npt.NDArray[np.float64],
+    out: npt.NDArray[np.float64],
     first: int,
     stop: int,
-    out: npt.NDArray[np.float64],
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 3) with the force of readings (n, n_taxels, 3)."""
 
 LANES: int
 """Partial sums of a sum over taxels; arrays of taxels are padded to a multiple of it."""
+N_COMPONENTS: int
+"""Values with a Haar window: F_a, and the components of F_tip."""
+ALWAYS_CONTACT: int
+CONTACT_BY_FORCE: int
+CONTACT_BY_NOISE: int
+CONTACT_BY_LOAD: int
+GAP_LIMIT_PERIODS: float
+"""A step in time of more sample periods is a gap."""
+MAX_BRIDGED_SECONDS: float
+"""Longest gap that windows in seconds bridge [s]."""
+MAX_DEVIATION: float
+"""Squares are of values of at most this many standard deviations."""
 
 def logistic(values: npt.NDArray[np.float64], /) -> None:
     """Replace log odds (n,) by probabilities, with the bits of the detector."""
@@ -53,18 +65,9 @@ class Stream:
     A call while another thread is inside one raises RuntimeError.
     """
 
-    def __new__(
-        cls,
-        hand: dict[str, object],
-        fingers: list[dict[str, object]],
-        features: list[dict[str, object]],
-        lags: list[dict[str, object]],
-        used: npt.NDArray[np.float64],
-        rotations: npt.NDArray[np.float64],
-        places: npt.NDArray[np.float64],
-        baseline: npt.NDArray[np.float64],
-        /,
-    ) -> Stream: ...
+    def __new__(cls, *arguments: bytes) -> Stream:
+        """Return the stream of the bytes of a `StreamConfig`, and of a baseline (n_taxels, 3)."""
+
     def advance(
         self,
         readings: npt.NDArray[np.float64],
@@ -89,18 +92,12 @@ class Detector:
     A call while another thread is inside one raises RuntimeError.
     """
 
-    def __new__(
-        cls,
-        stream: tuple[object, ...],
-        model: dict[str, object],
-        rules: list[dict[str, object]],
-        heads: list[dict[str, object]],
-        weights: npt.NDArray[np.float64],
-        makers: tuple[object, ...],
-        array_type: type,
-        note: Callable[[tuple[float, bytes, bytes]], None],
-        /,
-    ) -> Detector: ...
+    def __new__(cls, *arguments: object) -> Detector:
+        """Return the detector of the eight arguments of a `Stream`, and of four others.
+
+        They are the bytes of a `ModelConfig`, and an object with the names of `EstimateTypes`.
+        """
+
     def update(self, samples: object, time: float, /) -> HandEstimate | None:
         """Return the estimate; None for samples or a time that Python converts or refuses."""
 
@@ -118,18 +115,12 @@ class Detector:
         hand: npt.NDArray[np.float64],
         /,
     ) -> None:
-        """Process n samples. Fill (n, n_fingers, 12) C structs and (n,) states of the hand."""
+        """Process n samples; fill (n, n_fingers) structs, as float64, and (n,) hand states."""
 
-    def set_rules(
-        self,
-        rules: list[dict[str, object]],
-        heads: list[dict[str, object]],
-        weights: npt.NDArray[np.float64],
-        /,
-    ) -> None:
+    def set_rules(self, rules: bytes, weights: bytes, /) -> None:
         """Change rules and heads from the next sample on."""
 
-    def baselines(self, out: npt.NDArray[np.float64], /) -> list[bool]:
+    def baselines(self, out: npt.NDArray[np.float64], /) -> tuple[bool, ...]:
         """Fill (n_taxels, 3) with the tare, and return whether that of each finger is complete."""
 
     def last_time(self) -> float:

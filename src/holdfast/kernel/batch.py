@@ -63,7 +63,7 @@ def fill_haar_features(
         ValueError: an array has another shape or order in memory; a window that is no pairs.
     """
     _in_parts(
-        lambda first, stop: _extension.haar_features(force, window, first, stop, out),
+        lambda first, stop: _extension.haar_features(force, out, first, stop, window),
         len(force),
         force.nbytes,
         n_threads,
@@ -92,7 +92,7 @@ def fill_fingertip_force(
     """
     _in_parts(
         lambda first, stop: _extension.fingertip_force(
-            readings, baseline, rotations, first, stop, out
+            readings, baseline, rotations, out, first, stop
         ),
         len(readings),
         readings.nbytes,

@@ -10,6 +10,10 @@
 /* Longest gap that windows in seconds bridge: 0.1 s, with an allowance for rounding. */
 #define HF_MAX_BRIDGED_SECONDS ((hf_real)0.10001)
 
+/* Squares of features are of values of at most this many standard deviations: a moderate jolt of
+ * the taxels is a slip, a larger one no stronger sign of it. */
+#define HF_MAX_DEVIATION ((hf_real)5)
+
 #define HF_SQRT_2 ((hf_real)1.4142135623730951)
 
 /* One finger: its constants, and its part of the memory. Lanes of taxels count from its first. */

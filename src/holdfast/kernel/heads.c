@@ -3,10 +3,6 @@
 
 #include "finger.h"
 
-/* Squares are of values of at most this many standard deviations: a moderate jolt of the taxels is
- * a slip, a larger one no stronger sign of it. */
-#define HF_MAX_DEVIATION ((hf_real)5)
-
 /* Return output k of a head, without squares: w_k0 + sum_j w_kj phi_j, in the order of j. */
 static hf_real hf_linear(
     const holdfast_head *head, const hf_real *weights, size_t k, const hf_real *phi)

@@ -15,23 +15,37 @@
 #include "arrays.h"
 #include "batch.h"
 #include "detector.h"
-#include "kernel.h"
+#include "finger.h"
 
 /* The size of the scratch memory of a longer window, ten rows of doubles, could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
 
-/* Return 0 if the last n_out of n arrays share no memory with others, else set an exception. */
-static int check_apart(const array *arrays, size_t n, size_t n_out)
+/* Axes of the arrays that a function takes. Lengths below 0 are those of the first such array. */
+enum { N = 1, FINGERS, TAXELS, FEATURES, COLUMNS, AXES, MATRIX_ROWS, N_AXES };
+#define LENGTHS(...)                                                                               \
+    {                                                                                              \
+        [N] = -1, [AXES] = 3, [MATRIX_ROWS] = 3, __VA_ARGS__                                       \
+    }
+enum { MAX_ARRAYS = 5 };
+
+/* What a function expects of an argument that is an array. */
+typedef struct {
+    char type; /* see get_array */
+    bool is_out;
+    const char *name;
+    int axes[3]; /* 0 from the last one on */
+} parameter;
+
+/* Return 0 if array i shares no memory with those before it, else set an exception. */
+static int check_apart(const array *arrays, size_t i)
 {
-    for (size_t i = n - n_out; i < n; ++i) {
-        const char *const out = arrays[i].view.buf;
-        for (size_t j = 0; j < i; ++j) {
-            const char *const other = arrays[j].view.buf;
-            if (other + arrays[j].view.len > out && out + arrays[i].view.len > other) {
-                PyErr_Format(
-                    PyExc_ValueError, "%s and %s share memory", arrays[j].name, arrays[i].name);
-                return -1;
-            }
+    const char *const out = arrays[i].view.buf;
+    for (size_t j = 0; j < i; ++j) {
+        const char *const other = arrays[j].view.buf;
+        if (other + arrays[j].view.len > out && out + arrays[i].view.len > other) {
+            PyErr_Format(
+                PyExc_ValueError, "%s and %s share memory", arrays[j].name, arrays[i].name);
+            return -1;
         }
     }
     return 0;
@@ -46,124 +60,66 @@ static int check_count(Py_ssize_t n_args, Py_ssize_t expected)
     return -1;
 }
 
-#include "module_batch.c"
-
-/* A feature stream of a hand: its tables, its memory, and who uses it. */
-typedef struct {
-    PyObject_HEAD
-    holdfast_hand hand;
-    holdfast_memory memory;
-    void *blocks[8]; /* all that was allocated for this stream: `read_tables` does so eight times */
-    size_t n_blocks;
-    bool *present;    /* (n_fingers) of one sample */
-    size_t n_taxels;  /* of all fingers */
-    double last_time; /* of the newest sample [s] */
-    bool is_in_use;   /* a call without the GIL is running */
-} stream;
-
-/* The fields of the tables, which Python gives by name in dictionaries. */
-typedef enum { SIZE, CODE, FLAG, REAL, CODES_6 } field_type;
-
-typedef struct {
-    const char *name;
-    field_type type;
-    size_t offset;
-} field;
-
-/* clang-format off */
-#define OF_HAND(type, name) {#name, type, offsetof(holdfast_hand, name)}
-#define OF_FINGER(type, name) {#name, type, offsetof(holdfast_finger, name)}
-#define OF_FEATURE(type, name) {#name, type, offsetof(holdfast_feature, name)}
-#define OF_LAG(type, name) {#name, type, offsetof(holdfast_lag, name)}
-
-static const field hand_fields[] = {
-    OF_HAND(SIZE, n_fingers), OF_HAND(SIZE, n_lanes), OF_HAND(SIZE, n_features),
-    OF_HAND(SIZE, n_lags), OF_HAND(SIZE, n_history), OF_HAND(SIZE, n_channels),
-    OF_HAND(SIZE, n_levels), OF_HAND(SIZE, n_track), OF_HAND(REAL, period),
-    OF_HAND(CODE, tare_kind), OF_HAND(REAL, tare_seconds), OF_HAND(REAL, noise_seconds),
-    OF_HAND(REAL, average_gain), OF_HAND(FLAG, alike), OF_HAND(FLAG, has_centres),
-    OF_HAND(FLAG, has_ratios), {NULL, SIZE, 0},
-};
-
-static const field finger_fields[] = {
-    OF_FINGER(SIZE, first_taxel), OF_FINGER(SIZE, n_taxels), OF_FINGER(SIZE, first),
-    OF_FINGER(REAL, n_used), OF_FINGER(REAL, low), OF_FINGER(REAL, high), OF_FINGER(REAL, low_end),
-    OF_FINGER(REAL, high_end), OF_FINGER(REAL, max_offset), OF_FINGER(REAL, min_noise),
-    OF_FINGER(REAL, rounding_noise), OF_FINGER(REAL, max_field), OF_FINGER(REAL, max_step), OF_FINGER(REAL, normal[0]),
-    OF_FINGER(REAL, normal[1]), OF_FINGER(REAL, normal[2]),
-    OF_FINGER(SIZE, sigma_window), OF_FINGER(SIZE, ready_window), OF_FINGER(FLAG, is_magnetic),
-    OF_FINGER(FLAG, bridges),
-    {NULL, SIZE, 0},
-};
-
-static const field feature_fields[] = {
-    OF_FEATURE(CODE, kind), OF_FEATURE(CODE, transform), OF_FEATURE(FLAG, of_hand),
-    OF_FEATURE(SIZE, window), OF_FEATURE(SIZE, lag), OF_FEATURE(SIZE, same_as),
-    OF_FEATURE(REAL, floor), {NULL, SIZE, 0},
-};
-
-static const field lag_fields[] = {
-    OF_LAG(SIZE, samples), OF_LAG(REAL, seconds), OF_LAG(FLAG, has_changes),
-    OF_LAG(FLAG, has_seconds), OF_LAG(FLAG, has_means), OF_LAG(FLAG, has_ratios), {NULL, SIZE, 0},
-};
-/* clang-format on */
-
-/* Store the value of a field, or set an exception. */
-static void store(PyObject *value, field_type type, void *target)
+/* Take the arrays of all arguments, which fit each other, or set an exception and return -1.
+ *
+ * Arrays that are written stand last, and share no memory with others. */
+static int read_arrays(
+    PyObject *const *args, Py_ssize_t n_args, const parameter *expected, size_t n,
+    Py_ssize_t *lengths, array *arrays)
 {
-    if (type == SIZE) {
-        *(size_t *)target = PyLong_AsSize_t(value);
-    } else if (type == REAL) {
-        *(double *)target = PyFloat_AsDouble(value);
-    } else if (type == FLAG) {
-        *(bool *)target = PyObject_IsTrue(value) == 1;
-    } else if (type == CODE) {
-        const long code = PyLong_AsLong(value);
-        if (code < INT32_MIN || code > INT32_MAX) {
-            PyErr_Format(PyExc_OverflowError, "%ld has more than 32 bits", code);
-        }
-        *(int32_t *)target = (int32_t)code;
-    } else {
-        for (Py_ssize_t i = 0; i < 6 && !PyErr_Occurred(); ++i) {
-            PyObject *const item = PySequence_GetItem(value, i);
-            if (item != NULL) {
-                store(item, CODE, (char *)target + i * 4);
-                Py_DECREF(item);
-            }
-        }
-    }
-}
-
-/* Fill a struct from a dictionary with exactly its fields, or set an exception and return -1. */
-static int read_struct(PyObject *dictionary, const field *fields, void *target)
-{
-    Py_ssize_t n = 0;
-    if (!PyDict_Check(dictionary)) {
-        PyErr_Format(PyExc_TypeError, "a dictionary expected, %R given", dictionary);
+    if (check_count(n_args, (Py_ssize_t)n) < 0) {
         return -1;
     }
-    for (; fields[n].name != NULL; ++n) {
-        PyObject *const value = PyMapping_GetItemString(dictionary, fields[n].name);
-        if (value == NULL) {
-            return -1;
-        }
-        store(value, fields[n].type, (char *)target + fields[n].offset);
-        Py_DECREF(value);
-        if (PyErr_Occurred()) {
+    for (size_t i = 0; i < n; ++i) {
+        const int *const axes = expected[i].axes;
+        const int n_axes = !axes[1] ? 1 : !axes[2] ? 2 : 3;
+        const int flags = expected[i].is_out ? PyBUF_WRITABLE : PyBUF_SIMPLE;
+        if (get_array(expected[i].type, args[i], expected[i].name, n_axes, flags, &arrays[i]) < 0) {
             return -1;
         }
     }
-    if (PyDict_Size(dictionary) != n) {
-        PyErr_Format(
-            PyExc_ValueError, "%zd fields expected, %zd given", n, PyDict_Size(dictionary));
-        return -1;
+    for (size_t i = 0; i < n; ++i) {
+        Py_ssize_t shape[3];
+        for (int axis = 0; axis < arrays[i].view.ndim; ++axis) {
+            Py_ssize_t *const length = &lengths[expected[i].axes[axis]];
+            shape[axis] = *length = *length < 0 ? arrays[i].view.shape[axis] : *length;
+        }
+        if (check_shape(&arrays[i], shape) < 0) {
+            return -1;
+        }
+        if (expected[i].is_out && check_apart(arrays, i) < 0) {
+            return -1;
+        }
     }
     return 0;
 }
 
+#include "module_batch.c"
+
+enum { N_STREAM_PARTS = 8, MAX_BLOCKS = 8 };
+
+/* A feature stream of a hand: its constants, its memory, and who uses it. */
+typedef struct {
+    PyObject_HEAD
+    holdfast_hand hand; /* its tables are the bytes of `parts` */
+    holdfast_memory memory;
+    PyObject *parts[N_STREAM_PARTS]; /* bytes, which nothing can change */
+    void *blocks[MAX_BLOCKS];        /* that live as long as the stream */
+    size_t n_blocks;
+    bool *present;    /* (n_fingers) of one sample */
+    size_t n_taxels;  /* of all fingers */
+    double last_time; /* of the newest sample [s] */
+    bool is_in_use;   /* a call is running */
+    const char *noun; /* in messages */
+} stream;
+
 /* Allocate zeros that live as long as the stream; NULL with an exception. */
 static void *allocate(stream *s, size_t n, size_t size)
 {
+    if (s->n_blocks == MAX_BLOCKS) {
+        PyErr_SetString(PyExc_SystemError, "more blocks than a stream keeps");
+        return NULL;
+    }
     void *const block = PyMem_Calloc(n ? n : 1, size);
     if (block == NULL) {
         PyErr_NoMemory();
@@ -173,130 +129,126 @@ static void *allocate(stream *s, size_t n, size_t size)
     return block;
 }
 
-/* Fill a struct from item i of a list, or set an exception and return -1. */
-static int read_item(PyObject *list, size_t i, const field *fields, void *target)
+/* Return the n structs, or numbers, that bytes are; NULL with an exception. */
+static const void *from_bytes(PyObject *bytes, const char *name, size_t n, size_t size)
 {
-    PyObject *const item = PyList_GetItem(list, (Py_ssize_t)i);
-    if (item == NULL) { /* a number of an item before, which is any object, cut the list */
-        return -1;
-    }
-    Py_INCREF(item);
-    const int result = read_struct(item, fields, target);
-    Py_DECREF(item);
-    return result;
-}
-
-/* Return n structs of a list of dictionaries; NULL with an exception. */
-static void *read_structs(stream *s, PyObject *list, size_t n, const field *fields, size_t size)
-{
-    if ((size_t)PyList_Size(list) != n) {
-        PyErr_Format(
-            PyExc_ValueError, "%zu dictionaries with the field %s expected, %zd given", n,
-            fields[0].name, PyList_Size(list));
+    if (!PyBytes_Check(bytes)) {
+        PyErr_Format(PyExc_TypeError, "%s: bytes expected, %R given", name, bytes);
         return NULL;
     }
-    char *const block = allocate(s, n, size);
-    for (size_t i = 0; i < n && block != NULL; ++i) {
-        if (read_item(list, i, fields, block + i * size) < 0) {
-            return NULL;
-        }
+    if ((size_t)PyBytes_Size(bytes) != n * size) {
+        PyErr_Format(
+            PyExc_ValueError, "%s: %zu bytes expected, %zd given", name, n * size,
+            PyBytes_Size(bytes));
+        return NULL;
     }
-    return block;
+    const char *const data = PyBytes_AsString(bytes);
+    if ((uintptr_t)data % sizeof(double) != 0) {
+        PyErr_Format(PyExc_ValueError, "%s: bytes that are not aligned", name);
+        return NULL;
+    }
+    return data;
 }
 
-/* Return a copy of n numbers of an array; NULL with an exception. */
-static double *read_numbers(stream *s, PyObject *object, const char *name, size_t n)
+static int refuse_config(const char *wrong)
 {
-    array a = {0};
-    double *copy = NULL;
-    if (get_array('d', object, name, 1, PyBUF_SIMPLE, &a) == 0 &&
-        check_shape(&a, SHAPE((Py_ssize_t)n)) == 0) {
-        copy = allocate(s, n, sizeof(double));
-        if (copy != NULL) {
-            memcpy(copy, a.data, n * sizeof(double));
-        }
+    if (wrong == NULL) {
+        return 0;
     }
-    PyBuffer_Release(&a.view);
-    return copy;
+    PyErr_Format(PyExc_ValueError, "constants that do not fit: %s", wrong);
+    return -1;
 }
 
-/* Fill the tables of a stream, or set an exception and return -1. */
-static int read_tables(stream *s, PyObject *args)
+/* Take the constants of a stream and its baseline, begin it, or set an exception and return -1. */
+static int begin_stream(stream *s, PyObject *const *args, const char *noun)
 {
-    PyObject *hand, *fingers, *features, *lags, *used, *rotations, *places, *baseline;
     holdfast_hand *const h = &s->hand;
-    if (!PyArg_ParseTuple(
-            args, "O!O!O!O!OOOO:Stream", &PyDict_Type, &hand, &PyList_Type, &fingers, &PyList_Type,
-            &features, &PyList_Type, &lags, &used, &rotations, &places, &baseline) ||
-        read_struct(hand, hand_fields, h) < 0) {
+    const void *const hand = from_bytes(args[0], "hand", 1, sizeof *h);
+    if (hand == NULL) {
         return -1;
     }
+    memcpy(h, hand, sizeof *h);
     /* `holdfast_check` has the same limits, but reads the tables; here no product overflows. */
     if (h->n_fingers > HF_MAX_TAXELS || h->n_lanes > HF_MAX_TAXELS ||
         h->n_features > HF_MAX_FEATURES || h->n_lags > HF_MAX_FEATURES) {
         PyErr_SetString(PyExc_ValueError, "n_fingers, n_lanes, n_features or n_lags is too large");
         return -1;
     }
-    const size_t n = h->n_fingers;
-    if (!(h->fingers = read_structs(s, fingers, n, finger_fields, sizeof *h->fingers)) ||
-        !(h->features =
-              read_structs(s, features, n * h->n_features, feature_fields, sizeof *h->features)) ||
-        !(h->lags = read_structs(s, lags, h->n_lags, lag_fields, sizeof *h->lags)) ||
-        !(h->used = read_numbers(s, used, "used", h->n_lanes)) ||
-        !(h->rotations = read_numbers(s, rotations, "rotations", 9 * h->n_lanes)) ||
-        !(h->places = read_numbers(s, places, "places", 3 * h->n_lanes))) {
+    const size_t n = h->n_fingers, n_features = n * h->n_features, width = sizeof(double);
+    if (!(h->fingers = from_bytes(args[1], "fingers", n, sizeof *h->fingers)) ||
+        !(h->features = from_bytes(args[2], "features", n_features, sizeof *h->features)) ||
+        !(h->lags = from_bytes(args[3], "lags", h->n_lags, sizeof *h->lags)) ||
+        !(h->used = from_bytes(args[4], "used", h->n_lanes, width)) ||
+        !(h->rotations = from_bytes(args[5], "rotations", 9 * h->n_lanes, width)) ||
+        !(h->places = from_bytes(args[6], "places", 3 * h->n_lanes, width)) ||
+        refuse_config(holdfast_check(h)) < 0) {
         return -1;
     }
-    const char *const wrong = holdfast_check(h);
-    if (wrong != NULL) {
-        PyErr_Format(PyExc_ValueError, "tables that do not fit: %s", wrong);
-        return -1;
+    for (size_t i = 0; i < N_STREAM_PARTS; ++i) {
+        s->parts[i] = Py_NewRef(args[i]);
     }
     for (size_t i = 0; i < n; ++i) {
         s->n_taxels += h->fingers[i].n_taxels;
     }
-    void *const block = allocate(s, holdfast_memory_size(h), 1);
-    s->present = allocate(s, n, sizeof(bool));
-    if (block == NULL || s->present == NULL) {
+    const double *const baseline = from_bytes(args[7], "baseline", 3 * s->n_taxels, width);
+    void *const block = baseline ? allocate(s, holdfast_memory_size(h), 1) : NULL;
+    s->present = block ? allocate(s, n, sizeof(bool)) : NULL;
+    if (s->present == NULL) {
         return -1;
     }
     holdfast_place(h, &s->memory, block);
-    array a = {0};
-    int result = get_array('d', baseline, "baseline", 2, PyBUF_SIMPLE, &a);
-    if (result == 0) {
-        result = check_shape(&a, SHAPE((Py_ssize_t)s->n_taxels, 3));
+    holdfast_begin(h, &s->memory, baseline);
+    s->last_time = -INFINITY;
+    s->noun = noun;
+    return 0;
+}
+
+/* Return the arguments of a type; NULL with an exception for another number, or for names. */
+static PyObject *const *read_arguments(
+    PyObject *args, PyObject *names, Py_ssize_t n, PyObject **items)
+{
+    if (names != NULL && PyDict_Size(names) > 0) {
+        PyErr_SetString(PyExc_TypeError, "no arguments by name expected");
+        return NULL;
     }
-    if (result == 0) {
-        holdfast_begin(h, &s->memory, a.data);
+    if (check_count(PyTuple_Size(args), n) < 0) {
+        return NULL;
     }
-    PyBuffer_Release(&a.view);
-    return result;
+    for (Py_ssize_t i = 0; i < n; ++i) {
+        items[i] = PyTuple_GetItem(args, i);
+    }
+    return items;
 }
 
 static PyObject *stream_new(PyTypeObject *type, PyObject *args, PyObject *names)
 {
-    if (names != NULL && PyDict_Size(names) > 0) {
-        PyErr_SetString(PyExc_TypeError, "Stream takes no arguments by name");
+    PyObject *items[N_STREAM_PARTS];
+    if (read_arguments(args, names, N_STREAM_PARTS, items) == NULL) {
         return NULL;
     }
     stream *const s = (stream *)PyType_GenericAlloc(type, 0); /* all bytes are 0 */
-    if (s != NULL) {
-        s->last_time = -DBL_MAX;
-        if (read_tables(s, args) < 0) {
-            Py_DECREF(s);
-            return NULL;
-        }
+    if (s != NULL && begin_stream(s, items, "stream") < 0) {
+        Py_DECREF(s);
+        return NULL;
     }
     return (PyObject *)s;
+}
+
+static void free_stream(stream *s)
+{
+    while (s->n_blocks > 0) {
+        PyMem_Free(s->blocks[--s->n_blocks]);
+    }
+    for (size_t i = 0; i < N_STREAM_PARTS; ++i) {
+        Py_XDECREF(s->parts[i]);
+    }
 }
 
 static void stream_dealloc(PyObject *self)
 {
     stream *const s = (stream *)self;
     PyTypeObject *const type = Py_TYPE(self);
-    while (s->n_blocks > 0) {
-        PyMem_Free(s->blocks[--s->n_blocks]);
-    }
+    free_stream(s);
     PyObject_Free(self);
     Py_DECREF(type); /* an object of a heap type owns its type */
 }
@@ -336,63 +288,68 @@ static int check_times(const array *times, double last)
     return 0;
 }
 
+/* Let a stream be used by this call alone, or set an exception and return -1: what its arguments
+ * run, or another thread while the GIL is released, may call it. */
+static int begin_use(stream *s)
+{
+    if (s->is_in_use) {
+        PyErr_Format(PyExc_RuntimeError, "another thread is using this %s", s->noun);
+        return -1;
+    }
+    s->is_in_use = true;
+    return 0;
+}
+
+/* advance(readings, present, times, features, amplitude): process n samples. */
 static PyObject *stream_advance(PyObject *self, PyObject *const *args, Py_ssize_t n_args)
 {
+    static const parameter expected[] = {
+        {'d', false, "readings", {N, TAXELS, AXES}},
+        {'?', false, "present", {N, FINGERS}},
+        {'d', false, "times", {N}},
+        {'d', true, "features", {N, FINGERS, FEATURES}},
+        {'d', true, "amplitude", {N, FINGERS}},
+    };
     stream *const s = (stream *)self;
-    if (check_count(n_args, 5) < 0) {
+    if (begin_use(s) < 0) {
         return NULL;
     }
-    if (s->is_in_use) {
-        PyErr_SetString(PyExc_RuntimeError, "another thread is using this stream");
-        return NULL;
-    }
-    s->is_in_use = true; /* before an object that is no array may run Python */
-    array arrays[5] = {0}, *const readings = &arrays[0], *const present = &arrays[1];
-    array *const times = &arrays[2], *const features = &arrays[3], *const amplitude = &arrays[4];
+    Py_ssize_t lengths[N_AXES] = LENGTHS(
+        [FINGERS] = (Py_ssize_t)s->hand.n_fingers, [TAXELS] = (Py_ssize_t)s->n_taxels,
+        [FEATURES] = (Py_ssize_t)s->hand.n_features);
+    array arrays[MAX_ARRAYS] = {0}, *const times = &arrays[2];
     PyObject *result = NULL;
-    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('?', args[1], "present", 2, PyBUF_SIMPLE, present) < 0 ||
-        get_array('d', args[2], "times", 1, PyBUF_SIMPLE, times) < 0 ||
-        get_array('d', args[3], "features", 3, PyBUF_WRITABLE, features) < 0 ||
-        get_array('d', args[4], "amplitude", 2, PyBUF_WRITABLE, amplitude) < 0) {
-        goto done;
+    if (read_arrays(args, n_args, expected, 5, lengths, arrays) == 0 &&
+        check_times(times, s->last_time) == 0) {
+        s->last_time = lengths[N] > 0 ? times->data[lengths[N] - 1] : s->last_time;
+        /* To release the GIL takes longer than a sample. */
+        PyThreadState *const released = lengths[N] > 1 ? PyEval_SaveThread() : NULL;
+        advance_all(s, &arrays[0], &arrays[1], times, &arrays[3], &arrays[4]);
+        if (released != NULL) {
+            PyEval_RestoreThread(released);
+        }
+        result = Py_NewRef(Py_None);
     }
-    const Py_ssize_t n = times->view.shape[0], n_fingers = (Py_ssize_t)s->hand.n_fingers;
-    const Py_ssize_t n_taxels = (Py_ssize_t)s->n_taxels;
-    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
-        check_shape(present, SHAPE(n, n_fingers)) < 0 ||
-        check_shape(features, SHAPE(n, n_fingers, (Py_ssize_t)s->hand.n_features)) < 0 ||
-        check_shape(amplitude, SHAPE(n, n_fingers)) < 0 || check_apart(arrays, 5, 2) < 0 ||
-        check_times(times, s->last_time) < 0) {
-        goto done;
-    }
-    if (n > 0) {
-        s->last_time = times->data[n - 1];
-    }
-    /* To release the GIL takes longer than a sample. */
-    PyThreadState *const released = n > 1 ? PyEval_SaveThread() : NULL;
-    advance_all(s, readings, present, times, features, amplitude);
-    if (released != NULL) {
-        PyEval_RestoreThread(released);
-    }
-    result = Py_NewRef(Py_None);
-done:
-    release(arrays, 5);
+    release(arrays, MAX_ARRAYS);
     s->is_in_use = false;
     return result;
 }
 
 /* Pointers to functions of other types go through `void (*)(void)`, as Python's own modules do. */
+#define METHOD(name, function)                                                                     \
+    {                                                                                              \
+#name, (PyCFunction)(void (*)(void))(function), METH_FASTCALL, NULL                        \
+    }
 static PyMethodDef functions[] = {
-    {"haar_features", (PyCFunction)(void (*)(void))haar_features, METH_FASTCALL, NULL},
-    {"fingertip_force", (PyCFunction)(void (*)(void))fingertip_force, METH_FASTCALL, NULL},
-    {"logistic", (PyCFunction)(void (*)(void))logistic, METH_FASTCALL, NULL},
-    {"replay", (PyCFunction)(void (*)(void))replay, METH_FASTCALL, NULL},
+    METHOD(haar_features, haar_features),
+    METHOD(fingertip_force, fingertip_force),
+    METHOD(logistic, logistic),
+    METHOD(replay, replay),
     {NULL, NULL, 0, NULL},
 };
 
 static PyMethodDef stream_methods[] = {
-    {"advance", (PyCFunction)(void (*)(void))stream_advance, METH_FASTCALL, NULL},
+    METHOD(advance, stream_advance),
     {NULL, NULL, 0, NULL},
 };
 
@@ -407,19 +364,62 @@ static PyType_Spec stream_spec = {
     "holdfast.kernel._extension.Stream", sizeof(stream), 0, Py_TPFLAGS_DEFAULT, stream_slots,
 };
 
-#include "module_estimates.c"
-
 #include "module_detector.c"
+
+/* Constants that Python shares. */
+static int add_constants(PyObject *module)
+{
+    static const struct {
+        const char *name;
+        long value;
+    } codes[] = {
+        {"LANES", HF_LANES},
+        {"N_COMPONENTS", HF_N_COMPONENTS},
+        {"ALWAYS_CONTACT", HOLDFAST_ALWAYS_CONTACT},
+        {"CONTACT_BY_FORCE", HOLDFAST_CONTACT_BY_FORCE},
+        {"CONTACT_BY_NOISE", HOLDFAST_CONTACT_BY_NOISE},
+        {"CONTACT_BY_LOAD", HOLDFAST_CONTACT_BY_LOAD},
+    };
+    static const struct {
+        const char *name;
+        double value;
+    } numbers[] = {
+        {"GAP_LIMIT_PERIODS", HF_GAP_LIMIT_PERIODS},
+        {"MAX_BRIDGED_SECONDS", HF_MAX_BRIDGED_SECONDS},
+        {"MAX_DEVIATION", HF_MAX_DEVIATION},
+    };
+    for (size_t i = 0; i < sizeof codes / sizeof *codes; ++i) {
+        if (PyModule_AddIntConstant(module, codes[i].name, codes[i].value) < 0) {
+            return -1;
+        }
+    }
+    for (size_t i = 0; i < sizeof numbers / sizeof *numbers; ++i) {
+        PyObject *const number = PyFloat_FromDouble(numbers[i].value);
+        const int result = number ? PyModule_AddObjectRef(module, numbers[i].name, number) : -1;
+        Py_XDECREF(number);
+        if (result < 0) {
+            return -1;
+        }
+    }
+    return 0;
+}
+
+static int add_type(PyObject *module, const char *name, PyType_Spec *spec)
+{
+    PyObject *const type = PyType_FromModuleAndSpec(module, spec, NULL);
+    const int result = type ? PyModule_AddObjectRef(module, name, type) : -1;
+    Py_XDECREF(type);
+    return result;
+}
 
 static int add_contents(PyObject *module)
 {
-    PyObject *const type = PyType_FromModuleAndSpec(module, &stream_spec, NULL);
-    const int result = type == NULL ? -1 : PyModule_AddObjectRef(module, "Stream", type);
-    Py_XDECREF(type);
-    return result < 0 || add_detector(module) < 0 ||
-                   PyModule_AddIntConstant(module, "LANES", HF_LANES) < 0
-               ? -1
-               : PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
+    if (add_type(module, "Stream", &stream_spec) < 0 ||
+        add_type(module, "Detector", &detector_spec) < 0 ||
+        add_type(module, "Estimates", &estimates_spec) < 0 || add_constants(module) < 0) {
+        return -1;
+    }
+    return PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
 }
 
 static PyModuleDef_Slot module_slots[] = {

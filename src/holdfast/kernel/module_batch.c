@@ -1,36 +1,43 @@
 /* Functions of whole arrays of the extension module: a part of module.c, which includes it. */
 
+/* Read two integers from..to of n samples, or set an exception and return -1. */
+static int read_range(PyObject *const *args, Py_ssize_t n, Py_ssize_t *first, Py_ssize_t *stop)
+{
+    *first = PyLong_AsSsize_t(args[0]);
+    *stop = PyLong_AsSsize_t(args[1]);
+    if (PyErr_Occurred()) {
+        return -1;
+    }
+    if (*first < 0 || *first > *stop || *stop > n) {
+        PyErr_Format(PyExc_ValueError, "samples %zd to %zd of %zd given", *first, *stop, n);
+        return -1;
+    }
+    return 0;
+}
+
+/* haar_features(force, out, first, stop, window): fill rows first to stop of `out`. */
 static PyObject *haar_features(
     PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 5) < 0) {
-        return NULL;
-    }
-    const Py_ssize_t window = PyLong_AsSsize_t(args[1]);
-    const Py_ssize_t first = PyLong_AsSsize_t(args[2]);
-    const Py_ssize_t stop = PyLong_AsSsize_t(args[3]);
-    if (PyErr_Occurred()) {
-        return NULL;
-    }
-    array arrays[2] = {0}, *const force = &arrays[0], *const out = &arrays[1];
+    static const parameter expected[] = {
+        {'d', false, "force", {N, AXES}}, {'d', true, "out", {N, COLUMNS}}};
+    Py_ssize_t lengths[N_AXES] = LENGTHS([COLUMNS] = HOLDFAST_N_HAAR), first, stop;
+    array arrays[2] = {0};
     double *scratch = NULL;
     PyObject *result = NULL;
-    if (get_array('d', args[0], "force", 2, PyBUF_SIMPLE, force) < 0 ||
-        get_array('d', args[4], "out", 2, PyBUF_WRITABLE, out) < 0) {
+    if (check_count(n_args, 5) < 0 || read_arrays(args, 2, expected, 2, lengths, arrays) < 0 ||
+        read_range(args + 2, lengths[N], &first, &stop) < 0) {
         goto done;
     }
-    const Py_ssize_t n = force->view.shape[0];
-    if (check_shape(force, SHAPE(n, 3)) < 0 || check_shape(out, SHAPE(n, HOLDFAST_N_HAAR)) < 0 ||
-        check_apart(arrays, 2, 1) < 0) {
+    const Py_ssize_t window = PyLong_AsSsize_t(args[4]);
+    if (window < 2 || window % 2) {
+        if (!PyErr_Occurred()) {
+            PyErr_Format(PyExc_ValueError, "window %zd given", window);
+        }
         goto done;
     }
-    if (window < 2 || window % 2 || first < 0 || first > stop || stop > n) {
-        PyErr_Format(
-            PyExc_ValueError, "window %zd, samples %zd to %zd of %zd given", window, first, stop,
-            n);
-        goto done;
-    }
-    if (window <= n) { /* a longer one has no sample with features, and no scratch memory */
+    /* A longer window has no sample with features, and no scratch memory. */
+    if (window <= lengths[N]) {
         if (window < MAX_WINDOW) {
             scratch = PyMem_Malloc(holdfast_haar_scratch((size_t)window) * sizeof(double));
         }
@@ -41,7 +48,7 @@ static PyObject *haar_features(
     }
     Py_BEGIN_ALLOW_THREADS
     holdfast_haar_features(
-        force->data, (size_t)window, (size_t)first, (size_t)stop, out->data, scratch);
+        arrays[0].data, (size_t)window, (size_t)first, (size_t)stop, arrays[1].data, scratch);
     Py_END_ALLOW_THREADS
     result = Py_NewRef(Py_None);
 done:
@@ -50,44 +57,28 @@ done:
     return result;
 }
 
+/* fingertip_force(readings, baseline, rotations, out, first, stop) */
 static PyObject *fingertip_force(
     PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 6) < 0) {
-        return NULL;
-    }
-    const Py_ssize_t first = PyLong_AsSsize_t(args[3]);
-    const Py_ssize_t stop = PyLong_AsSsize_t(args[4]);
-    if (PyErr_Occurred()) {
-        return NULL;
-    }
-    array arrays[4] = {0}, *const readings = &arrays[0], *const baseline = &arrays[1];
-    array *const rotations = &arrays[2], *const out = &arrays[3];
+    static const parameter expected[] = {
+        {'d', false, "readings", {N, TAXELS, AXES}},
+        {'d', false, "baseline", {TAXELS, AXES}},
+        {'d', false, "rotations", {TAXELS, MATRIX_ROWS, AXES}},
+        {'d', true, "out", {N, AXES}},
+    };
+    Py_ssize_t lengths[N_AXES] = LENGTHS([TAXELS] = -1), first, stop;
+    array arrays[4] = {0};
     PyObject *result = NULL;
-    if (get_array('d', args[0], "readings", 3, PyBUF_SIMPLE, readings) < 0 ||
-        get_array('d', args[1], "baseline", 2, PyBUF_SIMPLE, baseline) < 0 ||
-        get_array('d', args[2], "rotations", 3, PyBUF_SIMPLE, rotations) < 0 ||
-        get_array('d', args[5], "out", 2, PyBUF_WRITABLE, out) < 0) {
-        goto done;
+    if (check_count(n_args, 6) == 0 && read_arrays(args, 4, expected, 4, lengths, arrays) == 0 &&
+        read_range(args + 4, lengths[N], &first, &stop) == 0) {
+        Py_BEGIN_ALLOW_THREADS
+        holdfast_fingertip_force(
+            arrays[0].data + 3 * lengths[TAXELS] * first, arrays[1].data, arrays[2].data,
+            (size_t)(stop - first), (size_t)lengths[TAXELS], arrays[3].data + 3 * first);
+        Py_END_ALLOW_THREADS
+        result = Py_NewRef(Py_None);
     }
-    const Py_ssize_t n = readings->view.shape[0], n_taxels = readings->view.shape[1];
-    if (check_shape(readings, SHAPE(n, n_taxels, 3)) < 0 ||
-        check_shape(baseline, SHAPE(n_taxels, 3)) < 0 ||
-        check_shape(rotations, SHAPE(n_taxels, 3, 3)) < 0 || check_shape(out, SHAPE(n, 3)) < 0 ||
-        check_apart(arrays, 4, 1) < 0) {
-        goto done;
-    }
-    if (first < 0 || first > stop || stop > n) {
-        PyErr_Format(PyExc_ValueError, "samples %zd to %zd of %zd given", first, stop, n);
-        goto done;
-    }
-    Py_BEGIN_ALLOW_THREADS
-    holdfast_fingertip_force(
-        readings->data + 3 * n_taxels * first, baseline->data, rotations->data,
-        (size_t)(stop - first), (size_t)n_taxels, out->data + 3 * first);
-    Py_END_ALLOW_THREADS
-    result = Py_NewRef(Py_None);
-done:
     release(arrays, 4);
     return result;
 }
@@ -95,48 +86,38 @@ done:
 /* logistic(values): replace log odds by probabilities. */
 static PyObject *logistic(PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
+    static const parameter expected[] = {{'d', true, "values", {N}}};
+    Py_ssize_t lengths[N_AXES] = LENGTHS([COLUMNS] = 0);
     array values = {0};
     PyObject *result = NULL;
-    if (check_count(n_args, 1) == 0 &&
-        get_array('d', args[0], "values", 1, PyBUF_WRITABLE, &values) == 0) {
-        const size_t n = (size_t)values.view.shape[0];
+    if (read_arrays(args, n_args, expected, 1, lengths, &values) == 0) {
         Py_BEGIN_ALLOW_THREADS
-        holdfast_logistic(values.data, n);
+        holdfast_logistic(values.data, (size_t)lengths[N]);
         Py_END_ALLOW_THREADS
         result = Py_NewRef(Py_None);
     }
-    PyBuffer_Release(&values.view);
+    release(&values, 1);
     return result;
 }
 
 /* replay(times, probability, raw, limits, out): the states of a finger with other limits. */
 static PyObject *replay(PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
 {
-    if (check_count(n_args, 5) < 0) {
-        return NULL;
-    }
-    array arrays[5] = {0}, *const times = &arrays[0], *const probability = &arrays[1];
-    array *const raw = &arrays[2], *const limits = &arrays[3], *const out = &arrays[4];
+    static const parameter expected[] = {
+        {'d', false, "times", {N}}, {'d', false, "probability", {N}},
+        {'b', false, "raw", {N}},   {'d', false, "limits", {COLUMNS}},
+        {'b', true, "out", {N}},
+    };
+    Py_ssize_t lengths[N_AXES] = LENGTHS([COLUMNS] = HOLDFAST_N_LIMITS);
+    array a[MAX_ARRAYS] = {0};
     PyObject *result = NULL;
-    if (get_array('d', args[0], "times", 1, PyBUF_SIMPLE, times) < 0 ||
-        get_array('d', args[1], "probability", 1, PyBUF_SIMPLE, probability) < 0 ||
-        get_array('b', args[2], "raw", 1, PyBUF_SIMPLE, raw) < 0 ||
-        get_array('d', args[3], "limits", 1, PyBUF_SIMPLE, limits) < 0 ||
-        get_array('b', args[4], "out", 1, PyBUF_WRITABLE, out) < 0) {
-        goto done;
+    if (read_arrays(args, n_args, expected, MAX_ARRAYS, lengths, a) == 0) {
+        Py_BEGIN_ALLOW_THREADS
+        holdfast_replay(
+            a[0].data, a[1].data, a[2].view.buf, (size_t)lengths[N], a[3].data, a[4].view.buf);
+        Py_END_ALLOW_THREADS
+        result = Py_NewRef(Py_None);
     }
-    const Py_ssize_t n = times->view.shape[0];
-    if (check_shape(probability, SHAPE(n)) < 0 || check_shape(raw, SHAPE(n)) < 0 ||
-        check_shape(limits, SHAPE(HOLDFAST_N_LIMITS)) < 0 || check_shape(out, SHAPE(n)) < 0 ||
-        check_apart(arrays, 5, 1) < 0) {
-        goto done;
-    }
-    Py_BEGIN_ALLOW_THREADS
-    holdfast_replay(
-        times->data, probability->data, raw->view.buf, (size_t)n, limits->data, out->view.buf);
-    Py_END_ALLOW_THREADS
-    result = Py_NewRef(Py_None);
-done:
-    release(arrays, 5);
+    release(a, MAX_ARRAYS);
     return result;
 }

@@ -16,8 +16,8 @@ from holdfast.contact import (
     Reason,
     StateChanges,
 )
-from holdfast.detector import HAND, Detection
-from holdfast.detector.slips import DetectedSlip, SlipWatch
+from holdfast.detection import HAND, Detection
+from holdfast.detection.slips import DetectedSlip, SlipWatch
 from holdfast.live.fault_notices import FAULT_TEXTS
 from holdfast.live.stream_detector import StreamEstimate
 from holdfast.recordings import shown_origin

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault, Reason
+from holdfast.detection import Model
 from holdfast.devices.sources.base import Arrival, ModuleSamples
 from holdfast.errors import ModelError
 from holdfast.live.readings_monitor import ReadingsMonitor
-from holdfast.model import Model
 from holdfast.recordings import GAP_PERIODS
 from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_per_update
 from holdfast.sensors import Sensor

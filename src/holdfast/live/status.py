@@ -7,14 +7,14 @@ from collections.abc import Callable
 import numpy as np
 
 from holdfast.contact import ContactState, Fault, HandEstimate
-from holdfast.detector.slips import SlipWatch
+from holdfast.detection import Model
+from holdfast.detection.slips import SlipWatch
 from holdfast.live.documents import Vector, finger_document
 from holdfast.live.fault_notices import FAULT_TEXTS, FaultWatch
 from holdfast.live.recorder import Recorder
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
-from holdfast.model import Model
 from holdfast.sensors.types import Array
 
 MAX_BUFFERED_UPDATES = 4096

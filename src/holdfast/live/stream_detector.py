@@ -16,15 +16,13 @@ from holdfast.contact import (
     StateChanges,
     with_faults,
 )
-from holdfast.detector import HAND, Detector
-from holdfast.detector.detector import check_thresholds
+from holdfast.detection import HAND, Detector, Model, Tare
+from holdfast.detection.detector import check_thresholds
+from holdfast.detection.plan import Start
 from holdfast.devices.sources import Arrival, Source
 from holdfast.devices.sources.base import ModuleSamples
 from holdfast.errors import ModelError, SourceError, StreamError
-from holdfast.features import Tare
-from holdfast.features.start import Start
 from holdfast.live.source_filter import FilteredSamples, SourceFilter
-from holdfast.model import Model
 from holdfast.recordings import BASELINES, GAP_PERIODS, STARTS_LOADED
 
 MIN_SILENCE_TIMEOUT = 0.1

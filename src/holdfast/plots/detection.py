@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from holdfast.contact import ContactState
-from holdfast.detector import Detection
+from holdfast.detection import Detection
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
     FONT_SIZE,

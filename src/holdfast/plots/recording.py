@@ -6,8 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from holdfast.features import DEFAULT_WINDOW, Tare
-from holdfast.model import Model
+from holdfast.detection import DEFAULT_WINDOW, Model, Tare
 from holdfast.plots.slips import (
     DECIDED_ALPHA,
     SLIP_COLOUR,

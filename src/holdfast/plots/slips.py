@@ -8,12 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FormatStrFormatter, MaxNLocator, PercentFormatter
 
 from holdfast.contact import SLIP_CODE, SLIP_SPEED
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.metrics import Decisions
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_thresholds import SlipSummary
 from holdfast.metrics.slips import FOUND_WITHIN, SlipCounts, SlipMetrics, count_slips
-from holdfast.model import Model
 from holdfast.plots import COLOURS
 from holdfast.plots.style import (
     FAINT,

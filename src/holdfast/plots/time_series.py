@@ -13,9 +13,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from holdfast.contact import Phase
-from holdfast.features import DEFAULT_WINDOW, FEATURE_NAMES, Tare
-from holdfast.features.force import tared_force
-from holdfast.features.frame import stretch_features
+from holdfast.detection import DEFAULT_WINDOW, FEATURE_NAMES, Tare
+from holdfast.detection.features import stretch_features, tared_force
 from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOURS
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array

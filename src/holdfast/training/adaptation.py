@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.classifiers import Linear, Parameters
-from holdfast.classifiers.folds import group_folds, time_folds
-from holdfast.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
-from holdfast.model import Model
+from holdfast.detection import Linear, Model
 from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.training.classifiers.fitting import Parameters
+from holdfast.training.classifiers.folds import group_folds, time_folds
+from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted
 from holdfast.training.dataset_scan import DatasetScan
 from holdfast.training.evaluation import was_trained_on
 from holdfast.training.finger_samples import FingerSamples, thinning_step

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from holdfast.detection import FingerModel, Handling, Model
+from holdfast.detection.specs import KINDS
 from holdfast.errors import ModelError, TrainingError
-from holdfast.features.specs import KINDS
-from holdfast.model import FingerModel, Handling, Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast.training.operating_point import (

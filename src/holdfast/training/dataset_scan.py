@@ -6,8 +6,8 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from holdfast.detection import EXACT_RATE, RELATIVE_RATES
 from holdfast.errors import TrainingError
-from holdfast.model import EXACT_RATE, RELATIVE_RATES
 from holdfast.recordings import Recording
 from holdfast.resampling import true_updates
 from holdfast.sensors import Sensor

@@ -9,7 +9,7 @@ from sklearn.base import BaseEstimator, ClassifierMixin
 from sklearn.utils.validation import check_is_fitted
 
 from holdfast.contact import STABLE
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
+from holdfast.detection import DEFAULT_WINDOW, DEPLOYED_FEATURES, Tare, parse_features
 from holdfast.recordings import Recording
 from holdfast.resampling import at_rate
 from holdfast.training.evaluation import compute_decisions, evaluate

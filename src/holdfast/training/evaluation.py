@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import SLIP_CODE, STABLE, UNKNOWN, Fault
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.metrics import (
     Decisions,
     FingerDecisions,
@@ -25,7 +25,6 @@ from holdfast.metrics.truth_labels import (
     labels_by_truth,
     without_margin,
 )
-from holdfast.model import Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, label_states
 from holdfast.sensors.types import Integers

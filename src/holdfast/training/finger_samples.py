@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Samples
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.errors import TrainingError
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Integers
+from holdfast.training.classifiers.fitting import Samples
 
 CONTACT_DEVIATIONS = 5.0
 """Contact threshold: number of standard deviations of F_a at rest above its mean."""

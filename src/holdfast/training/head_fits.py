@@ -6,14 +6,14 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers.fitting import Samples, standardise
-from holdfast.classifiers.linear import MAX_DEVIATION, Linear
-from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.classifiers.newton import fit_multinomial
 from holdfast.contact import CAUSES, Cause
-from holdfast.features import FeatureSpec
-from holdfast.model import ANY_FINGER, Head, Model
+from holdfast.detection import ANY_FINGER, FeatureSpec, Head, Model
+from holdfast.detection.heads import Linear
+from holdfast.kernel._extension import MAX_DEVIATION
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers.fitting import Samples, standardise
+from holdfast.training.classifiers.logreg import LogisticRegression
+from holdfast.training.classifiers.newton import fit_multinomial
 from holdfast.training.targets import TargetSamples
 
 SLIP_SMOOTHING, SLIP_HOLD_TIME = 0.02, 0.05

@@ -8,12 +8,11 @@ from typing import Self
 import numpy as np
 from msgspec import UNSET
 
-from holdfast.classifiers import Parameters
+from holdfast.detection import FeatureSpec, FingerModel, Head, Model, Training
 from holdfast.errors import TrainingError
-from holdfast.features import FeatureSpec
 from holdfast.metrics import SampleMetrics
-from holdfast.model import FingerModel, Head, Model, Training
 from holdfast.recordings import Recording
+from holdfast.training.classifiers.fitting import Parameters
 from holdfast.training.dataset_scan import DatasetScan, scan_dataset
 from holdfast.training.finger_samples import FingerSamples
 from holdfast.training.head_fits import fit_cause, fit_slip, fit_speed

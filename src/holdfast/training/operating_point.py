@@ -9,11 +9,11 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import STABLE, UNSTABLE
+from holdfast.detection import FingerModel, HeadName
 from holdfast.errors import TrainingError
 from holdfast.metrics import FingerDecisions
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_thresholds import THRESHOLDS
-from holdfast.model import FingerModel, HeadName
 from holdfast.sensors.types import Array, Flags
 from holdfast.training.own_handling import grasped_durations, location_and_scale
 from holdfast.training.replay import ThresholdReplay

@@ -11,13 +11,12 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
-from holdfast.detector import FingerTrace, detect
+from holdfast.detection import ANY_FINGER, Debounce, FingerTrace, Model, detect
+from holdfast.detection.features import extract
 from holdfast.errors import TrainingError
-from holdfast.features.stream import extract
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
-from holdfast.model import ANY_FINGER, Debounce, Model
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor

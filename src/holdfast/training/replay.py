@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 import msgspec
 import numpy as np
 
+from holdfast.detection import Debounce, Model
 from holdfast.kernel import _extension
 from holdfast.metrics import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
-from holdfast.model import Debounce, Model
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 

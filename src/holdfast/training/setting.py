@@ -4,12 +4,21 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
-from holdfast.classifiers import Adapted, ModelRecipe, recipe
+from holdfast.detection import (
+    ANY_FINGER,
+    DEFAULT_WINDOW,
+    DEPLOYED_FEATURES,
+    Debounce,
+    FeatureSpec,
+    Model,
+    Tare,
+    parse_features,
+)
+from holdfast.detection.specs import SLIP_FEATURES, check_window
 from holdfast.errors import ModelError
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FeatureSpec, Tare, parse_features
-from holdfast.features.haar import check_window
-from holdfast.features.specs import SLIP_FEATURES
-from holdfast.model import ANY_FINGER, Debounce, Model
+from holdfast.training.classifiers import recipe
+from holdfast.training.classifiers.fitting import ModelRecipe
+from holdfast.training.classifiers.logreg import Adapted
 from holdfast.training.tuning import Objective
 
 Split = Literal["recording", "object", "time", "random"]

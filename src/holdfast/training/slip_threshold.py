@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from holdfast.detection import Model
 from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLDS,
     SlipSummary,
@@ -12,7 +13,6 @@ from holdfast.metrics.slip_thresholds import (
     summarise_choice,
 )
 from holdfast.metrics.slips import SlipCounts, SlipCurve, slip_metrics
-from holdfast.model import Model
 from holdfast.training.tune import CurvePoint
 
 SLIP_FALSE_ALARMS = 1.0

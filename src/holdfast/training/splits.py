@@ -6,10 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Samples
-from holdfast.classifiers.folds import block_folds, group_folds, random_folds
 from holdfast.errors import TrainingError
 from holdfast.sensors.types import Integers
+from holdfast.training.classifiers.fitting import Samples
+from holdfast.training.classifiers.folds import block_folds, group_folds, random_folds
 from holdfast.training.dataset_scan import ScannedRecording
 from holdfast.training.setting import Split
 

@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import CAUSES, Cause, ContactState
+from holdfast.detection import HeadName
 from holdfast.metrics.slip_truth import DISTANCES, SLIDING, STILL, SlipTruth, has_slip_truth
 from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
-from holdfast.model import HeadName
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.training.finger_samples import finite_rows, outside_units

@@ -15,12 +15,11 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.logreg import LogisticRegression
+from holdfast.detection import ANY_FINGER, Head, Model, Training
+from holdfast.detection.features import extract
+from holdfast.detection.plan import StreamPlan, Tare
+from holdfast.detection.specs import TAUGHT_FEATURES
 from holdfast.errors import TrainingError
-from holdfast.features.specs import TAUGHT_FEATURES
-from holdfast.features.stream import extract
-from holdfast.features.tables import StreamPlan
-from holdfast.features.tare import Tare
 from holdfast.metrics.slip_thresholds import (
     SLIP_THRESHOLDS,
     SlipSummary,
@@ -31,11 +30,11 @@ from holdfast.metrics.slip_thresholds import (
 )
 from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
 from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
-from holdfast.model import ANY_FINGER, Head, Model, Training
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
+from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast.training.dataset_scan import OneRecording, Progress, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.head_fits import fit_slip

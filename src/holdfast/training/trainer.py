@@ -7,8 +7,7 @@ from typing import NamedTuple, Self
 
 import msgspec
 
-from holdfast.classifiers import Parameters, Samples
-from holdfast.features import FeatureSpec
+from holdfast.detection import ANY_FINGER, FeatureSpec, Model
 from holdfast.metrics import (
     Decisions,
     Metrics,
@@ -17,7 +16,6 @@ from holdfast.metrics import (
     score_recording,
 )
 from holdfast.metrics.slips import SlipCurve
-from holdfast.model import ANY_FINGER, Model
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -26,6 +24,7 @@ from holdfast.training.adaptation import (
     choose_adaptation,
     known_recordings,
 )
+from holdfast.training.classifiers.fitting import Parameters, Samples
 from holdfast.training.dataset_scan import (
     DatasetScan,
     OneRecording,

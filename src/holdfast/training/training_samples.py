@@ -8,12 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, UNKNOWN
-from holdfast.features import FeatureSpec, Tare
-from holdfast.features.force import rest_amplitude
-from holdfast.features.stream import extract
-from holdfast.features.tables import StreamPlan
+from holdfast.detection import ANY_FINGER, FeatureSpec, HeadName, Tare
+from holdfast.detection.features import extract, rest_amplitude
+from holdfast.detection.plan import StreamPlan
 from holdfast.metrics.slip_truth import slip_truth
-from holdfast.model import ANY_FINGER, HeadName
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording, Tactile, label_states
 from holdfast.resampling import at_rate

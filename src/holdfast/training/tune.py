@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import STABLE
+from holdfast.detection import Choice, Model, ThresholdPoint
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import (
     EventMetrics,
@@ -21,7 +22,6 @@ from holdfast.metrics import (
 )
 from holdfast.metrics.slip_thresholds import MAX_RAISED_QUIET, SLIP_THRESHOLDS, THRESHOLDS
 from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, slip_metrics
-from holdfast.model import Choice, Model, ThresholdPoint
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.replay import ThresholdReplay

@@ -13,8 +13,8 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Parameters, Recipe, Samples
 from holdfast.errors import OutputError
+from holdfast.training.classifiers.fitting import Parameters, Recipe, Samples
 
 if TYPE_CHECKING:
     from optuna import Trial

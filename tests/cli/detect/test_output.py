@@ -5,7 +5,7 @@ import pytest
 from holdfast.cli.detect import output
 from holdfast.cli.detect.output import json_lines, print_tables, watch
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
-from holdfast.detector import Detector, detect
+from holdfast.detection import Detector, Model, detect
 from holdfast.io import load_recording
 from holdfast.live.estimate_chunks import (
     ChangeLines,
@@ -15,7 +15,6 @@ from holdfast.live.estimate_chunks import (
     chunk_from_stream,
 )
 from holdfast.live.stream_detector import StreamEstimate
-from holdfast.model import Model
 from holdfast.recorded import BOX_SLIPS
 from holdfast.synthetic import synthetic_recording
 

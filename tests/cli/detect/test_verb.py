@@ -10,18 +10,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from command_line import Verb
-from holdfast.classifiers import Linear
 from holdfast.cli import main
 from holdfast.cli.detect.estimates import CHUNK_SIZE
 from holdfast.contact import UNSTABLE, Fault
-from holdfast.detector import detect
+from holdfast.detection import Debounce, FeatureSpec, FingerModel, Head, Linear, Model, detect
 from holdfast.devices.sources import open_source
-from holdfast.features import FeatureSpec
 from holdfast.io import load_recording, save_recording
 from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
-from holdfast.model import Debounce, FingerModel, Head, Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording

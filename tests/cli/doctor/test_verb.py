@@ -65,7 +65,7 @@ def test_broken_kernels_are_reported_with_exit_code_0(capsys, monkeypatch):
     def broken(force):
         raise RuntimeError("no kernel")
 
-    monkeypatch.setattr("holdfast.features.haar_features", broken)
+    monkeypatch.setattr("holdfast.detection.haar_features", broken)
     assert report(capsys)["kernels"]["error"] == "RuntimeError: no kernel"
     assert main(["doctor"]) == 0
     assert "RuntimeError: no kernel" in capsys.readouterr().out

@@ -4,13 +4,13 @@ from holdfast.cli.teach import guide as module
 from holdfast.cli.teach.guide import Guide, confirm_safety
 from holdfast.cli.teach.screen import TeachScreen
 from holdfast.cli.terminal.control import StopRequest
+from holdfast.detection import Model
 from holdfast.devices.sources.replay import ReplaySource
 from holdfast.errors import SourceError, TrainingError
 from holdfast.io import load_recording, save_recording
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import Stage
 from holdfast.live.teaching.steps import Check, Step
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 
 pytestmark = pytest.mark.slow

@@ -9,11 +9,11 @@ from command_line import Verb
 from holdfast.cli.teach import verb
 from holdfast.cli.teach.options import GuideOptions
 from holdfast.cli.teach.report import NO_SLIPS
+from holdfast.detection import Model
 from holdfast.io import save_recording
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import GraspResult
 from holdfast.live.teaching.steps import STEPS
-from holdfast.model import Model
 from holdfast.twin import webcam
 from training.build import handling_recording, normalised_model, sliding_recording
 

@@ -7,12 +7,12 @@ import time
 import pytest
 
 from command_line import Verb
-from holdfast.classifiers import RECIPES
 from holdfast.cli import main
+from holdfast.detection import Debounce, Model
 from holdfast.io import load_dataset, save_recording
-from holdfast.model import Debounce, Model
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, train
+from holdfast.training.classifiers import RECIPES
 
 pytestmark = pytest.mark.slow
 
@@ -54,7 +54,7 @@ def test_it_is_the_library_that_trains(capsys, data, model):
              "--split", "object", "--trials", 2, "--seed", 3, "--shared",
              "--contact-threshold", 9.5, "--max-samples", 900, "--jobs", 1]  # fmt: skip
     assert run(capsys, data, "-o", model, *words)[0] == 0
-    from holdfast.features import Tare, parse_features
+    from holdfast.detection import Tare, parse_features
 
     setting = Setting(
         classifier="svm",

@@ -9,9 +9,8 @@ import pytest
 
 from devices.sources.reading import LIMIT, some_of
 from devices.sources.sources import BROKEN, ENDING, EVERY, LASTING, N_SOON
-from holdfast.detector import Detector
+from holdfast.detection import Detector, Model
 from holdfast.errors import HoldfastError
-from holdfast.model import Model
 from holdfast.sensors import Sensor
 
 pytestmark = pytest.mark.slow

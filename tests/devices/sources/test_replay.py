@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from devices.sources.reading import Clock
-from holdfast.detector import Detector, detect
+from holdfast.detection import Detector, Model, detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import replay as module
 from holdfast.devices.sources.replay import ReplaySource
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording, save_recording
-from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording

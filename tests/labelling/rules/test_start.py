@@ -3,7 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.io import import_recordings
 from holdfast.labelling.rules import signal
 from holdfast.labelling.rules.forces import evidence_of_contact, fitting_tare, lowest_maximum

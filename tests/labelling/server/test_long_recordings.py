@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
-from holdfast.features.force import tared_force
+from holdfast.detection.features import tared_force
 from holdfast.io import load_recording, save_recording
 from holdfast.labelling.server import long_recordings, workspace
 from holdfast.labelling.server.long_recordings import load_for_labelling, without_force

@@ -2,7 +2,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.features import fingertip_force, haar_features
+from holdfast.detection import fingertip_force, haar_features
 from holdfast.labelling.server.signals import SERIES, FingerSignals, Signals, change_points, rounded
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError, web
 
-from holdfast.classifiers import Linear
 from holdfast.contact import Fault
-from holdfast.detector import detect
+from holdfast.detection import Choice, Head, Linear, ThresholdPoint, detect
 from holdfast.io import load_recording
 from holdfast.live.documents import finger_document
 from holdfast.live.session import Session
@@ -21,7 +20,6 @@ from holdfast.live.web.service import (
     WebSocketClient,
 )
 from holdfast.metrics.masks import runs
-from holdfast.model import Choice, Head, ThresholdPoint
 from holdfast.web.guard import Guard
 from live import build, estimates
 

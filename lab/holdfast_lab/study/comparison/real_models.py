@@ -10,9 +10,9 @@ from typing import Literal
 import numpy as np
 
 from holdfast.contact import STABLE, TIME_TOLERANCE, UNKNOWN, UNSTABLE, enough_contacts
+from holdfast.detection import Model
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import FingerDecisions, hand_decisions
-from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast.training import Setting, compute_decisions, train

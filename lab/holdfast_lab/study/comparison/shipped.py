@@ -14,11 +14,11 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import STABLE, UNKNOWN, ContactState
+from holdfast.detection import Model
 from holdfast.errors import TrainingError
 from holdfast.metrics import Decisions, score_recording
 from holdfast.metrics.events import POST_DURATIONS
 from holdfast.metrics.slips import SlipCounts, count_slips
-from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.teaching import teach

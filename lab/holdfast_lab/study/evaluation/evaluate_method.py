@@ -14,13 +14,13 @@ from typing import Literal
 import msgspec
 import numpy as np
 
-from holdfast.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.contact import UNKNOWN
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.metrics import Decisions, Metrics, calibration_sums, summarise
 from holdfast.metrics.samples import score_samples
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
+from holdfast.training.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.training.splits import RANDOM_FOLDS
 from holdfast_lab.study.evaluation.alarms import (
     EVENT,

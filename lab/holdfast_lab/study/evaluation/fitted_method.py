@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Classifier, Samples
 from holdfast.contact import UNSTABLE, enough_contacts, hand_states
 from holdfast.metrics import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import Classifier, Samples
 from holdfast.training.finger_samples import (
     concatenate,
     contact_threshold,

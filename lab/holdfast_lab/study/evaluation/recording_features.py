@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.metrics import FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.fft import rfft, rfftfreq
 from scipy.signal import butter, lfilter
 
-from holdfast.classifiers import recipe
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import recipe
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.study.methods.method import (
     FingerSignal,

@@ -12,12 +12,12 @@ object moves all fingers. The rule stays linear.
 
 from collections.abc import Mapping
 
-from holdfast.classifiers import recipe
-from holdfast.features import DEFAULT_WINDOW
-from holdfast.features.specs import HOLDFAST_FEATURES
-from holdfast.features.stream import extract
-from holdfast.features.tables import StreamPlan
+from holdfast.detection import DEFAULT_WINDOW
+from holdfast.detection.features import extract
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import HOLDFAST_FEATURES
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import recipe
 from holdfast_lab.study.methods.method import HandSignal, Method
 
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from holdfast.classifiers import recipe
 from holdfast.errors import TrainingError
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import recipe
 from holdfast_lab.study.methods.method import (
     HAND,
     FingerSignal,

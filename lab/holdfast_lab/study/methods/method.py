@@ -14,14 +14,14 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
-from holdfast.classifiers import Parameters, Recipe
-from holdfast.features import Tare
-from holdfast.features.force import tared_force
-from holdfast.features.tables import GAP_LIMIT_PERIODS
+from holdfast.detection import Tare
+from holdfast.detection.features import tared_force
+from holdfast.kernel._extension import GAP_LIMIT_PERIODS
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
+from holdfast.training.classifiers import Parameters, Recipe
 
 HAND = "hand"
 """Key of the features of a whole-hand method."""

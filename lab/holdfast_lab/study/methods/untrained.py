@@ -4,15 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from holdfast.classifiers import Parameters, Samples
-from holdfast.classifiers.fitting import Fitted
-from holdfast.classifiers.linear import Linear
-from holdfast.features import DEFAULT_WINDOW
-from holdfast.features.specs import FeatureSpec
-from holdfast.features.stream import extract
-from holdfast.features.tables import StreamPlan
-from holdfast.model import ANY_FINGER, Model
+from holdfast.detection import ANY_FINGER, DEFAULT_WINDOW, Model
+from holdfast.detection.features import extract
+from holdfast.detection.heads import Linear
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import FeatureSpec
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import Parameters, Samples
+from holdfast.training.classifiers.fitting import Fitted
 from holdfast_lab.study.methods.method import HandSignal, Method, stretchwise
 
 if TYPE_CHECKING:

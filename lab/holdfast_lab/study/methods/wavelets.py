@@ -14,10 +14,10 @@ from functools import partial
 
 import numpy as np
 
-from holdfast.classifiers import recipe
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES, haar_features
-from holdfast.features.haar import check_window
+from holdfast.detection import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES, haar_features
+from holdfast.detection.specs import check_window
 from holdfast.sensors.types import Array
+from holdfast.training.classifiers import recipe
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.classifiers.trees import GradientBoosting
 from holdfast_lab.study.methods.method import (

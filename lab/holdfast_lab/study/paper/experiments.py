@@ -9,8 +9,8 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
+from holdfast.detection import Tare
 from holdfast.errors import TrainingError
-from holdfast.features import Tare
 from holdfast.plots.time_series import FingerSeries, finger_series
 from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
 from holdfast_lab.report.sections import ReportFigure

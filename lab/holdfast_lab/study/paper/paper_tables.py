@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from holdfast.features import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
+from holdfast.detection import DEFAULT_WINDOW, DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast.plots.style import PAPER
 from holdfast_lab.figures.curves import PlottedCurve, draw_lines
 from holdfast_lab.report.result_tables import Key, ResultTable, Row

@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import Samples
-from holdfast.classifiers.folds import random_folds
-from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.detection import FEATURE_NAMES, Tare, haar_features
 from holdfast.resampling import at_rate
 from holdfast.sensors.types import Integers
+from holdfast.training.classifiers import Samples
+from holdfast.training.classifiers.folds import random_folds
 from holdfast.training.finger_samples import concatenate, labelled_samples, usable_rows
 from holdfast_lab.study.methods import FingerSignal, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy

@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import percent
 from holdfast.sensors.types import Integers
+from holdfast.training.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
 from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds

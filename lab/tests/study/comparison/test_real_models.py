@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, ContactState
+from holdfast.detection import Model
 from holdfast.errors import TrainingError
 from holdfast.metrics import FingerDecisions
-from holdfast.model import Model
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, compute_decisions, train

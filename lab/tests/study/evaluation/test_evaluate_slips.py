@@ -3,10 +3,10 @@ import numpy as np
 import pytest
 
 from holdfast.contact import UNKNOWN, UNSTABLE
+from holdfast.detection import Head
 from holdfast.metrics import slip_thresholds
 from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, ThresholdChoice
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
-from holdfast.model import Head
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob

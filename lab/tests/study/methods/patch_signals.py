@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from holdfast.features import Tare
+from holdfast.detection import Tare
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast_lab.study.methods import HandSignal, hand_signal

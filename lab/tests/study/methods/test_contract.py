@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples
 from holdfast.contact import ContactState
+from holdfast.detection import Tare
 from holdfast.errors import MissingExtra
-from holdfast.features import Tare
 from holdfast.recordings import Recording
 from holdfast.synthetic import synthetic_recording
+from holdfast.training.classifiers import Samples
 from holdfast_lab.study.methods import HAND, METHODS, hand_signal
 
 pytestmark = pytest.mark.slow

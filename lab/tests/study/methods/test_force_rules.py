@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from holdfast.classifiers import Samples
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
+from holdfast.training.classifiers import Samples
 from holdfast.twin.uskin_readout import UskinParameters
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.methods.force_rules import (

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState
+from holdfast.detection import Tare
 from holdfast.errors import TrainingError
-from holdfast.features import Tare
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import Sensor
 from holdfast_lab.study.methods import HAND, METHODS, hand_signal

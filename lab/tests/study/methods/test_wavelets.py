@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.features import FEATURE_NAMES, Tare, haar_features
+from holdfast.detection import FEATURE_NAMES, Tare, haar_features
 from holdfast_lab.study.methods import METHODS, hand_signal
 from holdfast_lab.study.methods.wavelets import detail_energy, normal_energy
 from training.build import tiny_recording

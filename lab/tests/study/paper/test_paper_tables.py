@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from holdfast.features import DEPLOYED_FEATURES, FEATURE_NAMES
+from holdfast.detection import DEPLOYED_FEATURES, FEATURE_NAMES
 from holdfast_lab.study.paper import paper_tables, published, random_split
 from holdfast_lab.study.paper.random_split import FitBudget
 from holdfast_lab.study.plan import Corpus, StudyPlan

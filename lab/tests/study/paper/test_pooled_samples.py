@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import STABLE, UNKNOWN
-from holdfast.features import fingertip_force, haar_features
+from holdfast.detection import fingertip_force, haar_features
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.paper.pooled_samples import COLUMNS, pool_samples
 from holdfast_lab.study.plan import scan_corpus

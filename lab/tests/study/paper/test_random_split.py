@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.classifiers import Fitted, Linear, Samples
-from holdfast.classifiers.logreg import LogisticRegression
-from holdfast.features import DEPLOYED_FEATURES
+from holdfast.detection import DEPLOYED_FEATURES, Linear
+from holdfast.training.classifiers import Fitted, Samples
+from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
     CONFUSION_RATES,

@@ -8,8 +8,8 @@ import pytest
 
 from holdfast.cli import main
 from holdfast.cli.app import spread_groups
+from holdfast.detection import Model
 from holdfast.io import load_recording, save_recording
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast_grip import GripCommand, Limits
 from holdfast_grip.hands import Claim, open_hand

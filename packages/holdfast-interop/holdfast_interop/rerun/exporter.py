@@ -8,8 +8,8 @@ import numpy as np
 import rerun as rr
 
 from holdfast.contact import UNKNOWN
-from holdfast.detector import detect
-from holdfast.detector.detection import STATE_BY_CODE
+from holdfast.detection import detect
+from holdfast.detection.traces import STATE_BY_CODE
 from holdfast.exporters.output import whole_files
 from holdfast.files import file_stem
 from holdfast.recordings import Recording
@@ -44,7 +44,7 @@ from holdfast_interop.scene.tracks import (
 )
 
 if TYPE_CHECKING:
-    from holdfast.model import Model
+    from holdfast.detection import Model
 
 
 def export(

@@ -4,9 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from holdfast.detection.plan import Tare, baseline_of, declared_baselines, offline_tare
 from holdfast.errors import RecordingError
-from holdfast.features.start import declared_baselines
-from holdfast.features.tare import Tare, baseline_of, offline_tare
 from holdfast.recordings import GAP_PERIODS, Recording
 from holdfast.sensors.types import Array, Integers
 

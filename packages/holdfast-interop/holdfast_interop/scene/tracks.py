@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import ContactState, faults_of
-from holdfast.detector import FingerTrace
-from holdfast.detector.detection import CAUSE_BY_CODE, STATE_BY_CODE
-from holdfast.detector.slips import SlipWatch
+from holdfast.detection import FingerTrace
+from holdfast.detection.slips import SlipWatch
+from holdfast.detection.traces import CAUSE_BY_CODE, STATE_BY_CODE
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 from holdfast_interop.scene.taxel_arrows import zeroed

@@ -13,12 +13,11 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import main
-from holdfast.detector import detect
-from holdfast.detector.detection import STATE_BY_CODE
+from holdfast.detection import Model, detect
+from holdfast.detection.traces import STATE_BY_CODE
 from holdfast.errors import SourceError, is_installed
 from holdfast.io import save_recording
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.model import Model
 from holdfast.synthetic import synthetic_recording
 from holdfast_interop.scene.tracks import events
 

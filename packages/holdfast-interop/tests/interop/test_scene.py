@@ -6,9 +6,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from holdfast.detector import detect
+from holdfast.detection import Model, detect
 from holdfast.errors import RecordingError
-from holdfast.model import Model
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording

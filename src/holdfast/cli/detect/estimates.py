@@ -18,15 +18,13 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.control import handle_stop_signals
-from holdfast.detector import Detector
+from holdfast.detection import Detector, Model, Tare
 from holdfast.devices.sources import open_source
 from holdfast.errors import ModelError, RecordingError
-from holdfast.features import Tare
 from holdfast.io import load_recording, read_chunks
 from holdfast.live.estimate_chunks import EstimateChunk, chunk_from_detection, chunk_from_stream
 from holdfast.live.fault_notices import FaultWatch
 from holdfast.live.readings_monitor import ReadingsMonitor
-from holdfast.model import Model
 from holdfast.recordings import Recording
 from holdfast.resampling import resample, true_updates
 

@@ -16,7 +16,7 @@ from holdfast.cli.terminal.console import (
     visible_json,
 )
 from holdfast.contact import ContactState
-from holdfast.detector import HAND
+from holdfast.detection import HAND, Model
 from holdfast.devices.sources import open_source
 from holdfast.live.documents import estimate_line
 from holdfast.live.estimate_chunks import (
@@ -27,7 +27,6 @@ from holdfast.live.estimate_chunks import (
     chunk_from_stream,
 )
 from holdfast.live.stream_detector import StreamDetector
-from holdfast.model import Model
 from holdfast.recordings import shown_origin
 
 LINES_PER_BLOCK = 8192

@@ -22,7 +22,7 @@ def installation() -> dict[str, Any]:
     try:  # load the kernel and run it once
         import numpy as np
 
-        from holdfast.features import haar_features
+        from holdfast.detection import haar_features
 
         haar_features(np.ones((16, 3)))
     except Exception as cause:  # any failure is reported

@@ -58,11 +58,11 @@ def export_model(
         ValueError: options contradict each other.
         HoldfastError: the model cannot be exported.
     """
+    from holdfast.detection import Model
+    from holdfast.detection.c_header import code_size
     from holdfast.exporters import export as write
     from holdfast.exporters import fingers_of_sensor
-    from holdfast.exporters.c_header import code_size
     from holdfast.io import load_recording
-    from holdfast.model import Model
 
     sensor, fingers = options.sensor, options.fingers
     if (sensor is None) != (fingers is None) or (sensor is not None and options.like is not None):

@@ -13,7 +13,7 @@ from holdfast.cli.terminal.progress import progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from holdfast.features import Tare
+    from holdfast.detection import Tare
 
 
 def info(
@@ -48,7 +48,7 @@ def info(
       holdfast info grasp.mcap --plot grasp.svg --tare first --json
       holdfast info grasp.mcap --plot slips.png --model model.json
     """
-    from holdfast.features import Tare
+    from holdfast.detection import Tare
 
     is_model = str(path).startswith("builtin:") or (path.suffix == ".json" and path.is_file())
     # A folder may have the suffix .json, and a model has no samples to draw.
@@ -58,8 +58,8 @@ def info(
     if model is not None and figure.plot is None:
         raise ValueError("--model is for the figure; --plot FILE expected beside it")
     if kind == "model":
-        from holdfast.model import Model
-        from holdfast.model.files import facts_of
+        from holdfast.detection import Model
+        from holdfast.detection.model_files import facts_of
 
         facts = facts_of(Model.load(path))
         print_json(facts) if as_json else print_model(facts, path.name)
@@ -73,9 +73,9 @@ def show_recording(
     path: Path, figure: PlotOptions, tare: "Tare", model: str | None, *, as_json: bool
 ) -> None:
     """Print the content of a recording, and draw its figure if it is wanted."""
+    from holdfast.detection import Model
     from holdfast.io import load_recording
     from holdfast.labelling.review.content import content_of
-    from holdfast.model import Model
 
     def draw() -> "Figure":
         from holdfast.plots.recording import plot_recording

@@ -41,7 +41,7 @@ def auto(
         --track object=/aruco/pose
     """
     require_extras("label")
-    from holdfast.features import Tare
+    from holdfast.detection import Tare
     from holdfast.labelling.rules import RULES
 
     if rule not in RULES:

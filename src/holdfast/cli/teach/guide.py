@@ -10,6 +10,7 @@ from threading import Thread
 
 from holdfast.cli.teach.screen import SAFETY, TeachScreen
 from holdfast.cli.terminal.control import MarkerKeys, StopRequest
+from holdfast.detection import Model
 from holdfast.devices.sources import Source
 from holdfast.devices.sources.twin import AskedTwin
 from holdfast.devices.uri import is_uri, open_source, parse
@@ -22,7 +23,6 @@ from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import TARE_SECONDS, GuidedProtocol, Stage
 from holdfast.live.teaching.steps import Check, Step
-from holdfast.model import Model
 
 MAX_UNATTENDED_ATTEMPTS = 2
 """Attempts of a grasp without a person, after which the protocol goes on all the same."""

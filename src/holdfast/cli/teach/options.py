@@ -14,8 +14,8 @@ from holdfast.cli.terminal.control import MarkerKeys, handle_stop_signals
 from holdfast.errors import HoldfastError, TrainingError, require_extras
 
 if TYPE_CHECKING:
+    from holdfast.detection import Model
     from holdfast.live.teaching.folder import TeachingFolder
-    from holdfast.model import Model
 
 WITH_CAMERA = (
     "The camera measures the slips of fingers whose stickers it sees, from 0.3 mm\n"

@@ -78,8 +78,8 @@ def teach(
       holdfast teach --from grasps/ -o mine.json --false-alarms 0.5
     """
     from holdfast.cli.teach.report import NO_SLIPS, print_taught
+    from holdfast.detection import Model
     from holdfast.files import refuse_overwrite
-    from holdfast.model import Model
     from holdfast.training.teaching import teach_with_report
 
     guide.check(source, data, speed)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def list_classifiers(name: str | None) -> str | None:
     """Return a name; print all names and exit if it is `list`."""
     if name == "list":
-        from holdfast.classifiers import RECIPES
+        from holdfast.training.classifiers import RECIPES
 
         print_lines(RECIPES)
         raise typer.Exit
@@ -113,8 +113,7 @@ class TrainingOptions:
         """
         from msgspec.structs import replace
 
-        from holdfast.features import DEPLOYED_FEATURES, Tare, parse_features
-        from holdfast.model import Model
+        from holdfast.detection import DEPLOYED_FEATURES, Model, Tare, parse_features
         from holdfast.training import Setting
         from holdfast.training.setting import DEFAULT_HOLD, DEFAULT_HYSTERESIS
 

@@ -10,9 +10,8 @@ import msgspec
 import numpy as np
 
 from holdfast.contact import LABEL_STATES, Fault
-from holdfast.detector import Detector
+from holdfast.detection import Detector, Model, Tare
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
 from holdfast.io import read_chunks
 from holdfast.labelling.review.findings import (
     faulty_readings,
@@ -22,7 +21,6 @@ from holdfast.labelling.review.findings import (
 )
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.labelling.server.workspace import summary_of
-from holdfast.model import Model
 from holdfast.recordings import Label, Recording
 from holdfast.sensors import taxel_number
 

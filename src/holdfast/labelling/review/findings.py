@@ -11,13 +11,13 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from holdfast.detection import RELATIVE_RATES
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import labels_path, load_labels
 from holdfast.labelling.review.scan import FindingsScan, ModuleScan
 from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
-from holdfast.model import RELATIVE_RATES
 from holdfast.recordings import Recording, Tactile, shown_origin
 
 CONSTANT_SECONDS = 0.5

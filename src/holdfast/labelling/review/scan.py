@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from holdfast.features.tare import first_finite
+from holdfast.detection.plan import first_finite
 from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.long_recordings import force_sensor
 from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison

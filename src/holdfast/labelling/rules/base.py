@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import UNKNOWN, Cause, ContactState
-from holdfast.detector.detection import CAUSE_BY_CODE, STATE_BY_CODE
+from holdfast.detection.traces import CAUSE_BY_CODE, STATE_BY_CODE
 from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.types import Array

@@ -25,9 +25,9 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, ContactState
+from holdfast.detection import Tare
+from holdfast.detection.plan import TareArgument
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
-from holdfast.features.tare import TareArgument
 from holdfast.labelling.rules.base import LabelWriter, StateTimeline
 from holdfast.labelling.rules.forces import FingerForce, HandForce, hand_force
 from holdfast.recordings import Label, Recording

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from holdfast.contact import MERGE_GAP, MIN_CONTACT_DURATION
+from holdfast.detection import Tare
+from holdfast.detection.features import tared_force
+from holdfast.detection.plan import TareArgument, baseline_of, first_finite, offline_tare
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
-from holdfast.features.force import tared_force
-from holdfast.features.tare import TareArgument, baseline_of, first_finite, offline_tare
 from holdfast.metrics.masks import Mask, covered, drop_short_runs, fill_short_gaps, n_samples_of
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED, Recording, Tactile
 from holdfast.sensors.types import Array

@@ -18,8 +18,8 @@ from holdfast.contact import (
     Cause,
     ContactState,
 )
-from holdfast.features import Tare
-from holdfast.features.tare import TareArgument
+from holdfast.detection import Tare
+from holdfast.detection.plan import TareArgument
 from holdfast.labelling.rules.base import (
     LabelWriter,
     StateTimeline,

@@ -21,9 +21,9 @@ from holdfast.contact import (
     Cause,
     ContactState,
 )
+from holdfast.detection import Tare
+from holdfast.detection.plan import TareArgument
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
-from holdfast.features.tare import TareArgument
 from holdfast.labelling.rules.base import (
     EvidenceText,
     LabelWriter,

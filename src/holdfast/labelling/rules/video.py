@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import Cause, ContactState
-from holdfast.features import Tare
-from holdfast.features.tare import TareArgument
+from holdfast.detection import Tare
+from holdfast.detection.plan import TareArgument
 from holdfast.io.foreign import read_stickers
 from holdfast.io.stickers import picture_stamps, stamps_path
 from holdfast.labelling.rules import signal

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from holdfast.detection import Tare
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
 from holdfast.labelling.rules.video_motion import TipMotion, force_of, mean_over, robust_fit
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array

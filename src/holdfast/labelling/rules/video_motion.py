@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from holdfast.detection import Tare
+from holdfast.detection.features import tared_force
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
-from holdfast.features.force import tared_force
 from holdfast.io.importers.table import read_table
 from holdfast.labelling.rules.base import check_positive
 from holdfast.labelling.rules.poses import OBJECT, POSE_COLUMNS

@@ -14,9 +14,9 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.features import DEFAULT_WINDOW, Tare, haar_features
-from holdfast.features.force import tared_force
-from holdfast.features.tare import TareArgument
+from holdfast.detection import DEFAULT_WINDOW, Tare, haar_features
+from holdfast.detection.features import tared_force
+from holdfast.detection.plan import TareArgument
 from holdfast.recordings import GAP_PERIODS, Tactile
 from holdfast.sensors.types import Array
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
+from holdfast.detection import Tare
+from holdfast.detection.plan import TareArgument
 from holdfast.errors import RecordingError
-from holdfast.features import Tare
-from holdfast.features.tare import TareArgument
 from holdfast.io import load_recording
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose

@@ -61,7 +61,7 @@ class OperatingPoint(Struct, frozen=True, kw_only=True):
 
 
 class DebounceInfo(Struct, frozen=True, kw_only=True):
-    """Debouncing of state changes: see `holdfast.model.Debounce`."""
+    """Debouncing of state changes: see `holdfast.detection.Debounce`."""
 
     min_duration: float
     hysteresis: float

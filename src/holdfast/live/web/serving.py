@@ -4,11 +4,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from holdfast.detection import Model
 from holdfast.devices.sources import open_source
 from holdfast.live.session import Session
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.live.web.service import LiveService
-from holdfast.model import Model
 from holdfast.web import server
 from holdfast.web.guard import Guard
 

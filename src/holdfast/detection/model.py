@@ -1,0 +1,670 @@
+"""The model of a hand: features, classifiers and decision rule."""
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from functools import partial
+from hashlib import sha256
+from importlib import resources
+from pathlib import Path
+from typing import Literal, Self
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.detection.features import extract
+from holdfast.detection.heads import HEAD_NAMES, Choice, Head, HeadName, Linear
+from holdfast.detection.model_files import decode, encode, read_model, write_model
+from holdfast.detection.plan import StreamPlan, Tare
+from holdfast.detection.specs import DEFAULT_WINDOW, FeatureSpec
+from holdfast.errors import ModelError
+from holdfast.recordings import Recording
+from holdfast.resampling import RATE_TOLERANCE
+from holdfast.sensors import Sensor
+from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE, Array, Integers
+
+MAX_WINDOW = 1 << 16
+"""Maximum length of a window [samples]."""
+MAX_FEATURES = 1024
+"""Maximum number of features of a finger."""
+MAX_FINGERS = 256
+"""Maximum number of fingers, and of sensors, in a model."""
+MAX_TAXELS = 4096
+"""Maximum number of taxels of a sensor in a model."""
+
+
+class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Own handling: what the features of a sensor are while its user holds objects, without slip.
+
+    Attributes:
+        location: of each feature of `FingerModel.features`.
+        scale: of each of them, above 0.
+        seconds: held time of one finger on which it rests [s].
+        thresholds: by the name of the head; other heads keep that of the model.
+        recordings: content digest of each recording, by name.
+
+    Raises:
+        ModelError: lengths differ, a number is not finite, a scale or the time is not above 0, or
+            a threshold is not from 0 to 1.
+    """
+
+    location: tuple[float, ...]
+    scale: tuple[float, ...]
+    seconds: float
+    thresholds: dict[HeadName, float] = {}
+    recordings: dict[str, str] = {}
+
+    def __post_init__(self) -> None:
+        if len(self.location) != len(self.scale):
+            raise ModelError(
+                f"{len(self.location)} locations and {len(self.scale)} scales of own handling "
+                "given; the same number of both expected"
+            )
+        # Finite first: a comparison with NaN is False, so that the next check would pass it.
+        if not all(math.isfinite(x) for x in (*self.location, *self.scale, self.seconds)):
+            raise ModelError("a number of the own handling is not finite")
+        if min((*self.scale, self.seconds)) <= 0:
+            raise ModelError("scales and held time above 0 expected for own handling")
+        for threshold in self.thresholds.values():
+            if not 0 <= threshold <= 1:
+                raise ModelError(f"a threshold from 0 to 1 expected, {threshold} given")
+
+
+class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Model of one finger: its heads, its rule of contact, and own handling.
+
+    Attributes:
+        heads: at most one of each name; `stable` is required, and `slip` for `slip_speed`.
+        sensor: name of the sensor of the training; None for any sensor.
+        contact_threshold: F_a below it is no contact [unit of the readings]; None for none.
+        contact_noise: the same as a multiple of the noise during the tare, used if
+            `contact_threshold` is None.
+        contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
+            for relative features; used instead of the others if it is given.
+        normalised: `stable` and `slip` work on features that are normalised by own handling. Their
+            means and scales are then those of default handling; `for_sensor` replaces them.
+        handling: own handling by the name of the sensor, of a model that is normalised.
+
+    Raises:
+        ModelError: the fields contradict each other.
+    """
+
+    heads: tuple[Head, ...]
+    sensor: str | None = None
+    contact_threshold: float | None = None
+    contact_noise: float | None = None
+    contact_load: float | None = None
+    normalised: bool = False
+    handling: dict[str, Handling] = {}
+
+    def __post_init__(self) -> None:
+        names = [head.name for head in self.heads]
+        if len(set(names)) < len(names):
+            raise ModelError(f"one head of each name expected, {', '.join(names)} given")
+        if "stable" not in names or ("slip_speed" in names and "slip" not in names):
+            raise ModelError(
+                f"a head stable, and slip for slip_speed, expected; {', '.join(names)} given"
+            )
+        features = self.features
+        check_limit("features of a finger", len(features), MAX_FEATURES)
+        check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
+        # The load is that of relative features, which the six of the paper do not have.
+        if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
+            raise ModelError("contact_load given; it needs at least one relative feature")
+        for value in (self.contact_threshold, self.contact_noise, self.contact_load):
+            if value is not None and not (math.isfinite(value) and value >= 0):
+                raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
+        self._check_handling()
+
+    def _check_handling(self) -> None:
+        if self.handling and not self.normalised:
+            raise ModelError("own handling given; it needs a model with normalised features")
+        check_limit("sensors with own handling", len(self.handling), MAX_FINGERS)
+        n_features = len(self.features)
+        for name, handling in self.handling.items():
+            if len(handling.location) != n_features:
+                raise ModelError(
+                    f"own handling of {len(handling.location)} features given for {name!r}, "
+                    f"{n_features} expected"
+                )
+            for head in handling.thresholds:
+                if self.head(head) is None:
+                    raise ModelError(f"a threshold of {head} given for {name!r}; no such head")
+
+    def head(self, name: HeadName) -> Head | None:
+        """Return the head with a name; None if there is none."""
+        return next((head for head in self.heads if head.name == name), None)
+
+    @property
+    def stable(self) -> Head:
+        """The head of stability."""
+        return next(head for head in self.heads if head.name == "stable")
+
+    @property
+    def slip(self) -> Head | None:
+        """The head that decides whether the finger slides; None if there is none."""
+        return self.head("slip")
+
+    @property
+    def features(self) -> tuple[FeatureSpec, ...]:
+        """Features of all heads: those of `stable` in their order, then others of the rest."""
+        # By the name of the head: a model file may list them in any order.
+        ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
+        return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
+
+    def indices(self, head: Head) -> Integers:
+        """Return the indices of the features of a head in those of the finger."""
+        features = self.features
+        return np.array([features.index(spec) for spec in head.features], dtype=np.int64)
+
+    def with_heads(self, *heads: Head) -> "FingerModel":
+        """Return the model with some heads in place of those of the same names, or beside them."""
+        by_name = {head.name: head for head in (*self.heads, *heads)}
+        return msgspec.structs.replace(self, heads=tuple(by_name.values()))
+
+    def without_heads(self, *names: HeadName) -> "FingerModel":
+        """Return the model without some heads."""
+        heads = tuple(head for head in self.heads if head.name not in names)
+        return msgspec.structs.replace(self, heads=heads)
+
+    @property
+    def default_handling(self) -> tuple[Array, Array]:
+        """Location and scale of `features` without own handling: those of `stable`, else `slip`."""
+        location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
+        # `stable` last: where both use a feature, its moments count.
+        for head in (self.slip, self.stable):
+            if head is not None:
+                location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
+        return location, scale
+
+    def for_sensor(self, sensor_name: str) -> "FingerModel":
+        """Return the model with the own handling of a sensor, if it has any, in its heads."""
+        handling = self.handling.get(sensor_name)
+        return self if handling is None else self.with_handling(handling)
+
+    def with_handling(self, handling: Handling) -> "FingerModel":
+        """Return the model with own handling in its heads.
+
+        With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
+        (phi_j - mean_j) / scale_j in `stable` and `slip`. Means and scales of the other heads are
+        of unstable or sliding samples, so they move as the default handling does.
+        """
+        before = self.default_handling
+        after = np.array(handling.location), np.array(handling.scale)
+        heads = []
+        for head in self.heads:
+            columns = self.indices(head)
+            location, scale = after[0][columns], after[1][columns]
+            if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
+                mean, own_scale = head.rule.moments
+                ratio = scale / before[1][columns]
+                location = location + ratio * (mean - before[0][columns])
+                scale = ratio * own_scale
+            threshold = handling.thresholds.get(head.name, head.threshold)
+            heads.append(head.normalised_by(location, scale).at(threshold, head.choice))
+        return msgspec.structs.replace(self, heads=tuple(heads), handling={})
+
+    def without_thresholds(self, name: HeadName) -> "FingerModel":
+        """Return the model whose own handling does not set the threshold of a head."""
+        replace = msgspec.structs.replace
+        handling = {
+            sensor: replace(own, thresholds={k: t for k, t in own.thresholds.items() if k != name})
+            for sensor, own in self.handling.items()
+        }
+        return replace(self, handling=handling)
+
+
+class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Debouncing of state changes. By default, and for the paper's figures, there is none.
+
+    Attributes:
+        min_duration: time that a new state must last before it is reported [s].
+        hysteresis: distance past its threshold that a probability needs to change the state.
+        hold: time for which UNSTABLE is still reported after the last unstable sample, while
+            the finger is in contact, so that one disturbance is one alarm [s].
+        switching: of the forward filter of the probability: how often a contact turns from stable
+            to unstable, or back [1/s]; 0 or unset for no filter. 15.3 is a probability of 0.8 to
+            stay as it is for 1/60 s.
+
+    Raises:
+        ModelError: a value is out of range.
+
+    Example:
+        >>> round(Debounce(switching=15.3).stay(1 / 60), 2)
+        0.8
+    """
+
+    min_duration: float = 0.0
+    hysteresis: float = 0.0
+    hold: float = 0.0
+    # Unset, not 0: models without a filter keep the digest that they had before there was one.
+    switching: float | msgspec.UnsetType = msgspec.UNSET
+
+    def __post_init__(self) -> None:
+        # Finite and not below 0: NaN passes no comparison.
+        rate = self.switching_rate
+        if not (math.isfinite(rate) and rate >= 0):
+            raise ModelError(f"a switching of at least 0 per second expected, {rate} given")
+        for seconds in (self.min_duration, self.hold):
+            if not (math.isfinite(seconds) and seconds >= 0):
+                raise ModelError(f"a duration of at least 0 s expected, {seconds} given")
+        if not 0 <= self.hysteresis < 1:
+            raise ModelError(f"a hysteresis from 0 to 1 expected, {self.hysteresis} given")
+
+    @property
+    def switching_rate(self) -> float:
+        """The rate of switching [1/s]; 0 if there is no filter."""
+        return 0.0 if self.switching is msgspec.UNSET else float(self.switching)
+
+    def stay(self, seconds: float) -> float:
+        """Return the probability that a contact is in the same state after some time [s]."""
+        return 0.5 * (1.0 + math.exp(-2.0 * self.switching_rate * seconds))
+
+
+class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Provenance of a model.
+
+    Attributes:
+        recordings: content digest of each training recording, by name.
+        split: split of the cross-validation.
+        parameters: hyper-parameters of each finger's classifier.
+        figures: pooled metrics out of fold.
+        seed: seed of all random numbers.
+        versions: versions of the packages that fitted it.
+        samples: number of used and of all labelled samples of each finger of which only every
+            n-th was used.
+        sliding_samples: number of sliding samples that each slip rule was trained on.
+    """
+
+    recordings: dict[str, str]
+    split: str
+    parameters: dict[str, dict[str, float | str | None]]
+    figures: dict[str, float | None] = {}
+    seed: int = 0
+    versions: dict[str, str] = {}
+    samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
+    sliding_samples: dict[str, int] | msgspec.UnsetType = msgspec.UNSET
+
+
+def check_limit(what: str, given: float, most: float) -> None:
+    """Refuse a number of things above a limit.
+
+    Raises:
+        ModelError: it is above the limit.
+    """
+    if given > most:
+        raise ModelError(f"at most {most:.7g} {what} expected, {given} given")
+
+
+ANY_FINGER = "*"
+"""Name in place of a finger, for a model of any finger."""
+EXACT_RATE = 0.05
+"""Tolerance of a measured rate beside a nominal one, as a share of it."""
+RELATIVE_RATES = (30.0, 1000.0)
+"""Rates for which relative features are made [Hz]."""
+
+
+class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Model of a hand: heads for each finger, or the same for all fingers (`"*"`).
+
+    Attributes:
+        fingers: models of the fingers, by name; `"*"` alone is for any finger.
+        sensors: the sensors that the fingers name.
+        rate: samples per second for which the windows are meant [Hz]; None for any rate.
+        window: N_w of the instability that is reported [samples].
+        tare: how the baseline is found, as text: "0.5", "first", "none" or "START:END".
+        debounce: debouncing of state changes.
+        training: provenance; None for a model without training.
+        schema: version of the file format.
+        name: of the model.
+
+    Raises:
+        ModelError: the fields contradict each other.
+
+    Example:
+        >>> model = Model.load("builtin:twin")
+        >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
+        (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
+        >>> ", ".join(head.name for head in model.finger("thumb").heads)
+        'stable, slip, slip_speed, cause'
+    """
+
+    fingers: dict[str, FingerModel]
+    rate: float | None = None
+    sensors: dict[str, Sensor] = {}
+    window: int = DEFAULT_WINDOW
+    tare: str = "0.5"
+    debounce: Debounce = Debounce()
+    training: Training | None = None
+    schema: Literal["holdfast.model/2"] = "holdfast.model/2"
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.fingers:
+            raise ModelError("a model of at least one finger expected, none given")
+        if ANY_FINGER in self.fingers and len(self.fingers) > 1:
+            raise ModelError(f"a model for any finger ('*') has no others; {list(self.fingers)}")
+        if self.rate is not None and not (math.isfinite(self.rate) and self.rate > 0):
+            raise ModelError(f"a rate above 0 Hz expected, {self.rate} given")
+        # A model file is untrusted: each limit bounds the memory that a detector would allocate.
+        check_limit("samples in a second", self.rate or 0, MAX_RATE)
+        check_limit("fingers", max(len(self.fingers), len(self.sensors)), MAX_FINGERS)
+        check_limit("samples in a window", self.window, MAX_WINDOW)
+        for sensor in self.sensors.values():
+            check_limit(f"taxels of {sensor.name}", sensor.n_taxels, MAX_TAXELS)
+        for name, finger in self.fingers.items():
+            if finger.sensor is not None and finger.sensor not in self.sensors:
+                raise ModelError(
+                    f"finger {name!r} names the sensor {finger.sensor!r}; "
+                    f"the model holds {list(self.sensors)}"
+                )
+        # Both raise for what cannot be used.
+        Tare.parse(self.tare)
+        FeatureSpec("sigma", self.window)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Load a model from a file, or a built-in model by its name (`builtin:twin`).
+
+        Raises:
+            ModelError: the file or name does not exist; the file is not JSON; it has an unknown
+                field, another shape, a number that is not finite, or another schema.
+        """
+        # Fields, not the object: a subclass that loads a built-in model gets its own type.
+        if str(path).startswith("builtin:"):
+            return cls(**msgspec.structs.asdict(built_in(str(path))))
+        return read_model(path, cls)
+
+    def save(self, path: str | Path, *, force: bool = False) -> None:
+        """Write the model as JSON.
+
+        Raises:
+            OutputError: the file exists and `force` is not given, or it cannot be written.
+        """
+        write_model(path, self, force=force)
+
+    @property
+    def digest(self) -> str:
+        """Digest of the content, for results that depend on the model."""
+        return sha256(encode(self)).hexdigest()
+
+    @property
+    def has_slip_rule(self) -> bool:
+        """Whether the model decides of any finger whether it slides."""
+        return any(part.slip is not None for part in self.fingers.values())
+
+    @property
+    def reports_slips(self) -> bool:
+        """Whether the model ever reports a slip: a threshold of 1 leaves it to `teach`."""
+        heads = [part.slip for part in self.fingers.values()]
+        return any(head is not None and head.threshold < 1 for head in heads)
+
+    @property
+    def slip_advice(self) -> str:
+        """What its slip rule is good for if it reports no slip; empty without such a rule."""
+        if self.reports_slips or not self.has_slip_rule:
+            return ""
+        return (
+            f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
+            "teach): slip_probability is a ranking, and UNSTABLE the sign to grip harder in advance"
+        )
+
+    def changed(self, change: Callable[[FingerModel], FingerModel]) -> Self:
+        """Return the model with each of its fingers changed by a function."""
+        fingers = {name: change(part) for name, part in self.fingers.items()}
+        return msgspec.structs.replace(self, fingers=fingers)
+
+    def with_threshold(
+        self, name: HeadName, threshold: float, choice: Choice | None = None
+    ) -> Self:
+        """Return the model with another threshold of a head, for all fingers and sensors."""
+
+        def changed(part: FingerModel) -> FingerModel:
+            head = part.head(name)
+            # Own handling would win over the threshold that is set here.
+            part = part.without_thresholds(name)
+            return part if head is None else part.with_heads(head.at(threshold, choice))
+
+        return self.changed(changed)
+
+    def finger(self, name: str, sensor: Sensor | None = None) -> FingerModel:
+        """Return the model of a finger.
+
+        Args:
+            name: of the finger.
+            sensor: on which it is used. With it, own handling of that sensor is in the classifiers
+                of the model (see `FingerModel.for_sensor`).
+
+        Raises:
+            ModelError: the model does not have that finger.
+        """
+        # A model of any finger has no others.
+        part = self.fingers.get(ANY_FINGER) or self.fingers.get(name)
+        if part is None:
+            raise ModelError(f"the model has no finger {name!r}; it has {', '.join(self.fingers)}")
+        return part if sensor is None else part.for_sensor(sensor.name)
+
+    def with_handling_of(self, sensors: Mapping[str, Sensor]) -> Self:
+        """Return the model with own handling in its classifiers, for the sensors of some fingers.
+
+        Fingers of one classifier that have several sensors are left with default handling.
+
+        Args:
+            sensors: sensor of each finger; `"*"` or any finger of a model of any finger.
+        """
+        fingers = {}
+        for name, part in self.fingers.items():
+            used = {s.name for finger, s in sensors.items() if name in (ANY_FINGER, finger)}
+            folded = part.for_sensor(used.pop()) if len(used) == 1 else part
+            fingers[name] = msgspec.structs.replace(folded, handling={})
+        return msgspec.structs.replace(self, fingers=fingers)
+
+    @property
+    def handled_sensors(self) -> tuple[str, ...]:
+        """Sensors whose own handling the model has; with the finger, unless it is for any."""
+        names = (
+            _sensor_of(finger, name)
+            for finger, part in self.fingers.items()
+            for name in part.handling
+        )
+        return tuple(dict.fromkeys(names))
+
+    def without_handling(self, sensors: Mapping[str, Sensor]) -> list[str]:
+        """Return the sensors that lack own handling, as `handled_sensors`, while others have it.
+
+        Args:
+            sensors: sensor of each finger on which the model is used.
+        """
+        known = self.handled_sensors
+        any_finger = ANY_FINGER in self.fingers
+        names = dict.fromkeys(
+            _sensor_of(ANY_FINGER if any_finger else finger, sensor.name)
+            for finger, sensor in sensors.items()
+        )
+        return [name for name in names if known and name not in known]
+
+    def handling_advice(self, sensors: Mapping[str, Sensor]) -> str:
+        """Return that default handling is used on some sensors, while others have their own.
+
+        Args:
+            sensors: sensor of each finger on which the model is used.
+
+        Returns:
+            A sentence for the user; empty if there is nothing to say.
+        """
+        missing = self.without_handling(sensors)
+        if not missing:
+            return ""
+        return (
+            f"{self.name or 'the model'} was calibrated on {', '.join(self.handled_sensors)}, not "
+            f"on {', '.join(missing)}: default handling is used (holdfast calibrate)"
+        )
+
+    def n_fingers(self, fingers: Collection[str]) -> int:
+        """Return the number of fingers on which the state of the hand depends.
+
+        Args:
+            fingers: of the hand, which a model of any finger decides about.
+        """
+        return len(fingers if ANY_FINGER in self.fingers else self.fingers)
+
+    def fingers_of(self, modules: Mapping[str, Sensor]) -> dict[str, Sensor]:
+        """Return the fingers that the model estimates on a hand, and their sensors.
+
+        They are all fingers that the model names, even those that the hand lacks. A model of
+        any finger estimates every module of its sensor (only fingertips, if there are any).
+
+        Args:
+            modules: sensor of each module of the hand.
+
+        Raises:
+            ModelError: the hand has none of the fingers, or a finger has another sensor.
+        """
+        if ANY_FINGER in self.fingers:
+            wanted = self.fingers[ANY_FINGER].sensor
+            # Pads and the palm have a slash: a model of any finger was trained on fingertips.
+            tips = {name: s for name, s in modules.items() if "/" not in name} or dict(modules)
+            fitting = {n: s for n, s in tips.items() if wanted is None or s.name == wanted}
+            if wanted is not None and not fitting:
+                raise _other_sensor(
+                    f"the model is for fingers with the sensor {wanted!r}; given are "
+                    + ", ".join(f"{name} ({sensor.name})" for name, sensor in modules.items())
+                )
+            for name, sensor in fitting.items():
+                self._check_sensor(name, sensor)
+            return fitting
+        for name in set(self.fingers) & set(modules):
+            self._check_sensor(name, modules[name])
+        if not set(self.fingers) & set(modules):
+            raise ModelError(
+                f"the model is for {', '.join(self.fingers)}; {', '.join(modules)} given"
+            )
+        return {
+            name: modules[name] if name in modules else self.sensors[str(finger.sensor)]
+            for name, finger in self.fingers.items()
+            if name in modules or finger.sensor is not None
+        }
+
+    def plan(self, sensors: Mapping[str, Sensor], source_rate: float) -> StreamPlan:
+        """Return the plan of the feature stream of some fingers, for a source of a rate [Hz].
+
+        Raises:
+            ModelError: the features are relative, and the rate is outside `RELATIVE_RATES`.
+        """
+        features = {name: self.finger(name).features for name in sensors}
+        relative = any(spec.seconds for specs in features.values() for spec in specs)
+        low, high = RELATIVE_RATES
+        # The model's rate where it has one: the source is resampled to it.
+        rate = self.rate or source_rate
+        if relative and not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
+            raise ModelError(
+                f"{rate:.4g} Hz given, the model expects {low:g} to {high:g} Hz; resample the "
+                "recording, or set the sensor to another rate"
+            )
+        return StreamPlan(
+            sensors=sensors,
+            features=features,
+            window=self.window,
+            tare=Tare.parse(self.tare),
+            rate=rate,
+        )
+
+    def blind_features(self, finger: str, sensor: Sensor) -> tuple[str, ...]:
+        """Return the kinds of features of a finger that need more taxels than a sensor has."""
+        features = self.finger(finger).features
+        return tuple(dict.fromkeys(x.kind for x in features if x.min_taxels > sensor.n_taxels))
+
+    def rate_fits(self, rate: float) -> bool:
+        """Return whether a source of a rate [Hz] needs no resampling."""
+        return self.rate is None or abs(rate / self.rate - 1) <= RATE_TOLERANCE
+
+    def predict_proba(self, recording: Recording) -> dict[str, npt.NDArray[np.float64]]:
+        """Return the probability of stability of every finger at each of its samples.
+
+        Args:
+            recording: at the model's rate.
+
+        Returns:
+            By finger, (n,); NaN during tare, warm-up, gap and fault.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+        """
+        sensors = self.fingers_of({n: m.sensor for n, m in recording.modules.items()})
+        present = {name: sensor for name, sensor in sensors.items() if name in recording.modules}
+        found = extract(self.plan(present, recording.rate), recording)
+        probabilities = {}
+        for name in present:
+            part = self.finger(name, sensors[name])
+            features = found[name].features[:, part.indices(part.stable)]
+            probabilities[name] = part.stable.rule.probability(features)
+        return probabilities
+
+    def _check_sensor(self, name: str, sensor: Sensor) -> None:
+        wanted = self.finger(name).sensor
+        if wanted is None:
+            return
+        known = self.sensors[wanted]
+        if (sensor.name, sensor.n_taxels) != (known.name, known.n_taxels):
+            raise _other_sensor(
+                f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
+                f"{known.n_taxels} ({known.name})"
+            )
+        # The unit after the kind: another sensor has often another unit as well.
+        if sensor.unit != known.unit:
+            raise _other_sensor(
+                f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
+            )
+        if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
+            raise _other_sensor(
+                f"{name}: the taxels of {sensor.name} have other rotations than those of the "
+                "training"
+            )
+
+
+def _sensor_of(finger: str, sensor_name: str) -> str:
+    """Return the name of a sensor, with its finger unless the model is for any."""
+    return sensor_name if finger == ANY_FINGER else f"{finger} ({sensor_name})"
+
+
+def _other_sensor(text: str) -> ModelError:
+    """Return the error of a model for another sensor, with the built-in model that fits."""
+    return ModelError(f"{text}; builtin:any fits every 3-axis sensor")
+
+
+def built_in(name: str) -> Model:
+    """Return a built-in model by its name.
+
+    Raises:
+        ModelError: the name is unknown.
+    """
+    if name not in BUILT_IN:
+        raise ModelError(f"unknown model {name!r}; built in are {', '.join(BUILT_IN)}")
+    return BUILT_IN[name]()
+
+
+def _shipped(name: str) -> Model:
+    """Return a model whose file is part of the package, see docs/models.md."""
+    data = (resources.files("holdfast") / "models" / f"{name}.json").read_bytes()
+    return msgspec.structs.replace(decode(data, Model), name=f"builtin:{name}")
+
+
+def _noise_floor() -> Model:
+    """Return a model without training: stable while sigma is under three times the noise.
+
+    The noise is that of the tare. At the noise itself the probability is 0.9, at nine times the
+    noise it is 0.1.
+    """
+    slope = 2.0
+    rule = Linear((math.log(3.0),), (1.0,), ((-slope,),), (0.0,))
+    features = (FeatureSpec("sigma", DEFAULT_WINDOW, "noise"),)
+    head = Head(name="stable", link="logit", features=features, rule=rule)
+    finger = FingerModel(heads=(head,), contact_noise=5.0)
+    return Model(name="builtin:noise-floor", fingers={ANY_FINGER: finger})
+
+
+BUILT_IN: dict[str, Callable[[], Model]] = {
+    "builtin:any": partial(_shipped, "any"),  # trained on randomized hands of the twin
+    "builtin:twin": partial(_shipped, "twin"),  # trained on grasps of the twin
+    "builtin:noise-floor": _noise_floor,
+}

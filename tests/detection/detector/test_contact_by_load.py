@@ -1,0 +1,143 @@
+"""Contact by the load of the stream, as `builtin:any` decides it."""
+
+import msgspec
+import numpy as np
+import pytest
+
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
+from holdfast.detection import Debounce, Model, detect
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import sensor
+
+RATE = 100.0
+SENSOR = sensor("papillarray")
+LOADED = np.array([0.05, -0.03, 0.2])
+"""Force on each taxel of a finger that holds something [N]."""
+
+
+def states_of(forces, noise=1e-3, seed=0):
+    """Codes of the states, for (n, 3) the force on each taxel."""
+    return detect(Model.load("builtin:any"), recording_of(forces, noise, seed)).fingers["a"].state
+
+
+def recording_of(forces, noise=1e-3, seed=0):
+    rng = np.random.default_rng(seed)
+    readings = np.asarray(forces)[:, None, :] + rng.normal(0, noise, (len(forces), 9, 3))
+    module = Tactile(SENSOR, np.arange(len(forces)) / RATE, readings, "N")
+    return Recording("made", {"a": module})
+
+
+def steps(*parts):
+    """(n, 3) forces, from (seconds, share of the load at the end) with straight lines between."""
+    shares, last = [], parts[0][1]
+    for seconds, share in parts:
+        shares.append(np.linspace(last, share, round(seconds * RATE), endpoint=False))
+        last = share
+    return np.concatenate(shares)[:, None] * LOADED
+
+
+def test_an_empty_finger_is_without_contact():
+    states = states_of(np.zeros((2000, 3)))
+    assert (states[1:] == NO_CONTACT).all()
+
+
+def test_a_steady_hold_is_stable_and_its_release_is_not():
+    states = states_of(steps((1, 0), (0.3, 1), (5, 1), (0.2, 0), (3, 0)))
+    assert (states[1:100] == NO_CONTACT).all()
+    assert (states[250:630] == STABLE).all()
+    assert (states[710:] == NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("echo", [0.0, 0.04])
+def test_a_tare_under_load_ends_with_the_release(echo):
+    states = states_of(steps((3, 1), (0.2, echo), (3, echo), (0.3, 1), (3, 1)))
+    assert (states[380:620] == NO_CONTACT).all()
+    assert (states[800:] == STABLE).all()
+
+
+def test_a_tare_under_load_is_in_contact_while_the_force_moves():
+    sway = 1 + 0.3 * np.sin(2 * np.pi * 0.8 * np.arange(800) / RATE)
+    states = states_of(sway[:, None] * LOADED)
+    assert (states[30:] != NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.02, 0.06])
+def test_a_finger_is_not_stable_once_its_force_has_gone(rest):
+    states = states_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, rest), (2, rest)))
+    assert (states[250:530] == STABLE).all()
+    gone = round(RATE * 5.5)
+    assert (states[gone:] != STABLE).all()
+    assert (states[gone + 45 :] == NO_CONTACT).all()
+
+
+def test_shear_that_draws_the_normal_force_down_is_held():
+    """As a magnetic skin: the shear grows, and its normal readings fall at some taxels."""
+    n = round(6 * RATE)
+    rng = np.random.default_rng(3)
+    grown = np.clip(np.arange(n) / RATE, 0, 1)[:, None, None]
+    force = np.zeros((9, 3))
+    force[:, 0], force[:6, 2], force[6:, 2] = 0.3, -0.05, 0.08
+    readings = grown * force + rng.normal(0, 1e-3, (n, 9, 3))
+    recording = Recording("sheared", {"a": Tactile(SENSOR, np.arange(n) / RATE, readings, "N")})
+    states = detect(Model.load("builtin:any"), recording).fingers["a"].state
+    assert (states[150:] == STABLE).all()
+
+
+def loads(shares):
+    """(n, 3) forces by a share of the load at each sample."""
+    return np.asarray(shares)[:, None] * LOADED
+
+
+def test_a_short_dip_of_the_load_is_no_loss_of_contact():
+    shares = np.concatenate(
+        [np.zeros(100), np.full(300, 0.05), np.full(15, 0.002), np.full(200, 0.05)]
+    )
+    states = states_of(loads(shares))
+    assert (states[110:] != NO_CONTACT).all()
+
+
+def test_a_load_that_stays_low_is_a_loss_of_contact():
+    shares = np.concatenate([np.zeros(100), np.full(300, 0.05), np.full(200, 0.002)])
+    states = states_of(loads(shares))
+    assert (states[300:400] == STABLE).all()
+    assert (states[450:] == NO_CONTACT).all()
+
+
+def test_a_finger_that_touches_is_unstable_at_first():
+    states = states_of(steps((1, 0), (1, 0.06), (2, 0.06)))
+    first = int(np.argmax(states[1:] != NO_CONTACT)) + 1
+    assert 100 <= first < 200
+    assert (states[first : first + 10] == UNSTABLE).all()
+    assert (states[330:] == STABLE).all()
+
+
+def test_a_force_that_leaves_keeps_its_probability():
+    """It is UNSTABLE by its force: the probability is that of the features."""
+    model = Model.load("builtin:any")
+    raw = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
+    trace = detect(raw, recording_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (2, 0)))).fingers[
+        "a"
+    ]
+    leaving = trace.state == UNSTABLE
+    assert leaving.any() and (trace.stable_probability[leaving] > 0).all()
+
+
+@pytest.mark.parametrize(("share", "noise"), [(0.4, 1e-3), (1.8, 1e-3), (0.3, 8e-3)])
+def test_a_force_of_which_a_large_share_comes_or_goes_at_once_is_unstable(share, noise):
+    """The classifier of stability alone may call it stable, as it learns from slips."""
+    states = states_of(steps((1, 0), (0.3, 1), (4, 1), (0.1, share), (2, share)), noise)
+    assert (states[250:525] == STABLE).all()
+    assert (states[538:545] == UNSTABLE).all()
+    assert (states[600:] == STABLE).all()
+
+
+def test_a_force_that_swings_slowly_is_not_unsteady():
+    sway = 1 + 0.3 * np.sin(2 * np.pi * 0.4 * np.arange(400) / RATE)
+    raw = msgspec.structs.replace(
+        Model.load("builtin:any").with_threshold("stable", 0.0), debounce=Debounce()
+    )
+    recording = recording_of(
+        np.concatenate([steps((1, 0), (0.3, 1), (2, 1)), sway[:, None] * LOADED])
+    )
+    states = detect(raw, recording).fingers["a"].state
+    assert (states[200:] == STABLE).all()

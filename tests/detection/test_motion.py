@@ -1,0 +1,340 @@
+"""The relative features against a slow implementation, and their laws."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.detection import Tare
+from holdfast.detection.features import extract
+from holdfast.detection.kernel_config import (
+    AVERAGE_SECONDS,
+    COUNT_NOISE,
+    NEWTON_NOISE,
+    stream_config,
+)
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import (
+    ANY_FEATURES,
+    ANY_LAGS,
+    RELATIVE_KINDS,
+    SLIP_FEATURES,
+    FeatureSpec,
+    kinds_of,
+)
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
+from holdfast.sensors import sensor as built_in
+
+RATE = 100.0
+NEEDED = ("changes", "seconds", "means", "ratios")
+EVERY = tuple(
+    FeatureSpec(kind, transform="relative", seconds=lag)
+    for kind in RELATIVE_KINDS
+    for lag in ANY_LAGS
+)
+
+
+def features_of(readings, given, rate=RATE, specs=EVERY, times=None):
+    times = np.arange(len(readings)) / rate if times is None else times
+    module = Tactile(given, times, readings)
+    plan = StreamPlan({"a": given}, {"a": specs}, 14, Tare.parse("first"), rate)
+    return extract(plan, Recording("made", {"a": module}))["a"].features
+
+
+def naive(readings, given, rate=RATE):
+    """(n, kinds * lags) by loops, from the definitions."""
+    f = np.einsum("nij,tnj->tni", given.rotations, readings - readings[0].astype(float))
+    normal, n_taxels = given.normal, given.n_taxels
+    places = given.positions - given.positions.mean(axis=0)
+    radius = math.sqrt((places**2).sum(axis=1).mean())
+    places = places / radius if radius else np.zeros_like(places)
+    step = COUNT_NOISE if given.unit == "count" else NEWTON_NOISE
+    floor = step * math.sqrt(3 * n_taxels)
+    total = f.sum(axis=1)
+    along = total @ normal
+    least_loaded = [int(along[: k + 1].argmin()) for k in range(len(f))]
+    references = f[[0, *least_loaded[:-1]]]
+    weights = np.abs((f - references) @ normal)
+    centre = np.array([w @ places / w.sum() if w.sum() else np.zeros(3) for w in weights])
+    moment = np.array([normal @ np.cross(places, sample).sum(axis=0) for sample in f])
+    norm = lambda vectors: np.sqrt((vectors**2).sum())  # noqa: E731
+    peak = peak_taxels = 0.0
+    ratios = np.zeros(len(f))
+    averages = np.full((len(ANY_LAGS), 5), np.nan)
+    least = math.inf, math.inf
+    block, began = [], 0.0
+    rows = np.full((len(f), len(RELATIVE_KINDS) * len(ANY_LAGS)), np.nan)
+    for k in range(len(f)):
+        reference = least_loaded[k]
+        load, taxel_load = norm(total[k] - total[reference]), norm(f[k] - f[reference])
+        keep = math.exp(-1 / rate / 5.0)
+        peak, peak_taxels = max(load, keep * peak), max(taxel_load, keep * peak_taxels)
+        now = least
+        if k and (readings[k] != readings[k - 1]).any():
+            block.append((norm(total[k] - total[k - 1]) ** 2, norm(f[k] - f[k - 1]) ** 2))
+        if block:
+            found = tuple(max(math.sqrt(x / 2), floor) for x in np.mean(block, axis=0))
+            if k / rate - began >= 0.2 and len(block) >= 5:
+                least = tuple(map(min, least, found))
+                block, began = [], k / rate
+            now = found if math.isinf(least[0]) else least
+        elif math.isinf(least[0]):
+            now = floor, floor
+        noise, taxel_noise = now
+        beyond = total[k] - total[reference]
+        shear_force = beyond - beyond @ normal * normal
+        floor_force = abs(beyond @ normal) + 10 * noise
+        ratios[k] = norm(shear_force) / floor_force
+        tangent = shear_force / norm(shear_force) if norm(shear_force) else shear_force
+        if k < 1:
+            continue
+        whole, of_taxels = peak + 100 * noise, peak_taxels + 100 * taxel_noise
+        for i, seconds in enumerate(ANY_LAGS):
+            back = min(max(1, round(seconds * rate)), k)
+            j = k - back
+            change = total[k] - total[j]
+            shear = change - change @ normal * normal
+            rest = f[k] - f[j] - change / n_taxels
+            rest_shear = rest - (rest @ normal)[:, None] * normal
+            relative = lambda square, noise, load: math.hypot(  # noqa: E731
+                math.sqrt(max(square - 4 * noise**2, 0.0)) / load, 0.005
+            )
+            two, turned = math.sqrt(2 / 3), moment[k] - moment[j]
+            values = [
+                relative(norm(change) ** 2, noise, whole),
+                relative(norm(shear) ** 2, two * noise, whole),
+                relative(norm(rest) ** 2, taxel_noise, of_taxels),
+                relative(norm(rest_shear) ** 2, two * taxel_noise, of_taxels),
+                norm(centre[k] - centre[j]) + 1e-3,
+                relative(turned**2, math.sqrt(1 / 3) * taxel_noise, whole),
+                whole / noise,
+            ]
+            back = min(max(1, round(seconds * rate)), k // 2)
+            squares = second_squares(f, k, back, weights[k], normal)
+            share = 1 - math.exp(-1 / rate / AVERAGE_SECONDS)
+            is_first = np.isnan(averages[i, 0])
+            averages[i] = squares if is_first else averages[i] + share * (squares - averages[i])
+            seconds_of = np.concatenate([squares, averages[i]]) / taxel_noise**2
+            seconds_of = np.log(np.maximum(seconds_of - 6, 0) + 6 / 16) / 2
+            gains = [change @ tangent / floor_force, change @ normal / floor_force]
+            gains.append(ratios[k] - ratios[j])
+            rows[k, i :: len(ANY_LAGS)] = [*np.log(values), *seconds_of, *gains]
+    return rows
+
+
+def second_squares(forces, k, back, pressed, normal):
+    """Squared second differences: of all taxels, by load, against the common motion, largest."""
+    d = forces[k] - 2 * forces[k - back] + forces[k - 2 * back]
+    n = len(d)
+    shares = pressed / pressed.sum() if pressed.sum() else np.zeros(n)
+    squares = (d**2).sum(axis=1)
+    shear = ((d - (d @ normal)[:, None] * normal) ** 2).sum(axis=1)
+    own = d - shares[:, None] * d.sum(axis=0)
+    top = max(squares[pressed > pressed.mean()], default=0.0)
+    return np.array(
+        [squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top]
+    )
+
+
+def sensor(name):
+    """Return a built-in sensor from whose readings no field of the earth is taken."""
+    return replace(built_in(name), magnetic=False)
+
+
+def walk(given, n=150, seed=0, scale=300.0):
+    """Readings that rest, are pressed, and move."""
+    rng = np.random.default_rng(seed)
+    load = np.clip((np.arange(n) - 30) / 20, 0, 1)[:, None, None]
+    moving = np.cumsum(rng.normal(size=(n, given.n_taxels, 3)), axis=0) * 0.02
+    noise = rng.normal(size=(n, given.n_taxels, 3)) * 0.003
+    pressed = load * (1 + rng.random((given.n_taxels, 3))) + load * moving + noise
+    if given.unit == "count":
+        return np.rint(32000 + scale * pressed).astype(np.uint16)
+    return pressed
+
+
+@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-curved", "anyskin", "papillarray"])
+@pytest.mark.parametrize("rate", [30.0, 100.0, 500.0])
+def test_equal_the_definitions(name, rate):
+    given = sensor(name)
+    readings = walk(given)
+    np.testing.assert_allclose(
+        features_of(readings, given, rate), naive(readings, given, rate), rtol=1e-9, atol=1e-9
+    )
+
+
+def test_repeated_samples_are_no_noise():
+    given = sensor("uskin-4x4")
+    readings = np.repeat(walk(given, 60), 2, axis=0)
+    np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-9)
+
+
+def test_are_known_from_the_second_sample_on():
+    given = sensor("uskin-4x4")
+    found = features_of(walk(given), given)
+    assert np.isnan(found[0]).all()
+    assert np.isfinite(found[1:]).all()
+
+
+@settings(max_examples=20)
+@given(factor=st.floats(0.01, 100.0), seed=st.integers(0, 99))
+def test_do_not_depend_on_the_gain_of_the_sensor(factor, seed):
+    given = sensor("papillarray")
+    readings = walk(given, 80, seed)
+    np.testing.assert_allclose(
+        features_of(factor * readings, given)[1:], features_of(readings, given)[1:], atol=1e-6
+    )
+
+
+def test_do_not_depend_on_the_order_of_the_taxels():
+    given = sensor("uskin-4x4")
+    readings = walk(given, 80)
+    order = np.random.default_rng(0).permutation(16)
+    turned = Sensor(
+        "other", given.positions[order], given.rotations[order], given.normal, 100.0,
+        range=given.range,
+    )  # fmt: skip
+    np.testing.assert_allclose(
+        features_of(readings[:, order], turned), features_of(readings, given), atol=1e-9
+    )
+
+
+def test_do_not_depend_on_the_frame_of_the_sensor():
+    given = sensor("papillarray")
+    readings = walk(given, 80)
+    angle = 0.7
+    turn = np.array(
+        [[math.cos(angle), 0, math.sin(angle)], [0, 1, 0], [-math.sin(angle), 0, math.cos(angle)]]
+    )
+    turned = Sensor(
+        "other", given.positions @ turn.T, turn @ given.rotations, turn @ given.normal, 100.0, "N"
+    )
+    np.testing.assert_allclose(
+        features_of(readings, turned), features_of(readings, given), atol=1e-8
+    )
+
+
+def test_a_common_motion_of_the_taxels_leaves_no_residual():
+    given = sensor("papillarray")
+    readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
+    readings[50:] += np.linspace(0, 1, 40)[:, None, None]
+    found = features_of(readings, given)
+    change, residual = (
+        RELATIVE_KINDS.index(kind) * len(ANY_LAGS) for kind in ("force_change", "residual")
+    )
+    assert found[80, change] > -4
+    assert found[80, residual] < -5
+
+
+def of_kinds(kinds, seconds=0.02):
+    return tuple(FeatureSpec(kind, transform="relative", seconds=seconds) for kind in kinds)
+
+
+def test_a_second_difference_does_not_see_a_steady_motion_but_a_jolt():
+    given = sensor("papillarray")
+    readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
+    readings[40:] += np.linspace(0, 1, 50)[:, None, None]
+    readings[80:, 4] += 0.01
+    found = features_of(readings, given, specs=of_kinds(kinds_of("second", "mean_second")))
+    assert (np.abs(found[60:80, :5]) < 1.5).all()
+    assert (found[80, [0, 3]] > 2.5).all()
+    assert (found[80, [5, 8]] < found[80, [0, 3]]).all()
+    assert (found[86, [5, 8]] > found[86, [0, 3]]).all()  # the averages remember it
+
+
+def test_the_own_second_difference_leaves_out_a_common_jolt():
+    given = sensor("papillarray")
+    readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
+    readings[40:] += [0.0, 0.0, 1.0]  # an even load: all taxels have the same share
+    readings[80:] += [0.01, 0.0, 0.0]
+    every, own = features_of(readings, given, specs=of_kinds(("second_all", "second_own")))[80]
+    assert every > 3
+    assert own < 0.5
+
+
+def test_the_ratio_rises_with_shear_and_falls_with_load():
+    given = sensor("papillarray")
+    kinds = of_kinds(("shear_gain", "normal_gain", "ratio_gain"), seconds=0.1)
+    readings = 1e-5 * np.random.default_rng(0).normal(size=(120, 9, 3))
+    readings[40:, :, 2] += 1.0
+    readings[60:, :, 0] += 0.5
+    sheared = features_of(readings, given, specs=kinds)[60]
+    assert sheared[0] > 0.1
+    assert abs(sheared[1]) < 0.05
+    assert sheared[2] > 0.1
+    readings[80:, :, 2] += 1.0
+    pressed = features_of(readings, given, specs=kinds)[80]
+    assert abs(pressed[1]) > 0.2
+    assert pressed[2] < -0.1
+
+
+def test_a_stream_computes_only_the_kinds_that_it_needs():
+    given = sensor("uskin-4x4")
+    plan = StreamPlan({"a": given}, {"a": SLIP_FEATURES}, 14, Tare.parse("first"), 150.0)
+    lags = stream_config(plan).lags
+    assert [lag["samples"] for lag in lags] == [1, 2, 4, 16]
+    needed = [[lag[f"has_{what}"] for what in NEEDED] for lag in lags]
+    assert needed == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
+    plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
+    lags = stream_config(plan).lags
+    assert [[lag[f"has_{what}"] for what in NEEDED] for lag in lags] == [[1, 0, 0, 0]] * 5
+
+
+@pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
+def test_other_normals(normal):
+    given = replace(sensor("uskin-4x4"), normal=np.array(normal))
+    readings = walk(given, 60)
+    np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-6)
+
+
+def test_a_gap_begins_anew_but_the_load_stays():
+    given = sensor("uskin-4x4")
+    readings = walk(given, 120)
+    times = np.arange(120) / RATE
+    times[60:] += 1.0
+    found = features_of(readings, given, times=times)
+    assert np.isnan(found[60]).all()
+    assert np.isfinite(found[61]).all()
+    load = RELATIVE_KINDS.index("load_to_noise") * len(ANY_LAGS)
+    assert found[61, load] == pytest.approx(found[59, load], abs=0.3)
+
+
+def test_one_taxel_has_floors_and_no_nan():
+    given = Sensor("one", np.zeros((1, 3)), np.eye(3)[None], np.array([0, 0, 1.0]), 100.0, "N")
+    readings = np.random.default_rng(0).normal(size=(50, 1, 3))
+    assert np.isfinite(features_of(readings, given)[1:]).all()
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"kind": "residual"}, "the transform 'relative' is for force_change"),
+        ({"kind": "F_a", "transform": "relative"}, "the transform 'relative' is for force_change"),
+        ({"kind": "residual", "transform": "relative"}, "a lag above 0 s expected for relative"),
+        ({"kind": "F_a", "seconds": 0.1}, "a lag above 0 s expected for relative kinds alone; F_a"),
+        (
+            {"kind": "residual", "transform": "relative", "seconds": 9.0},
+            "a lag from 0 to 2 s expected, 9",
+        ),
+        ({"kind": "residual", "transform": "relative", "seconds": math.nan}, "a lag from 0 to 2 s"),
+    ],
+)
+def test_specifications_that_contradict_themselves_are_refused(fields, message):
+    with pytest.raises(ValueError, match=message):
+        FeatureSpec(**fields)
+
+
+def test_the_list_for_slips():
+    assert len(SLIP_FEATURES) == 39
+    assert str(SLIP_FEATURES[15]) == "relative(second_all[0.0067 s])"
+    assert str(SLIP_FEATURES[-1]) == "relative(ratio_gain[0.107 s])"
+
+
+def test_the_list_for_any_hand():
+    assert len(ANY_FEATURES) == 31
+    assert {spec.transform for spec in ANY_FEATURES} == {"relative"}
+    assert str(ANY_FEATURES[0]) == "relative(force_change[0.017 s])"

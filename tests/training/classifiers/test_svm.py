@@ -1,0 +1,134 @@
+"""The interior-point method against a general solver, laws of the minimum, and hard samples."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog, minimize
+
+from holdfast.training.classifiers.svm import fit_svm
+
+from .two_classes import samples
+
+WEIGHTS = (1.0, 1.0), (0.6, 3.0)
+
+
+def signed(features, stable):
+    """(n, d + 1) rows y (x, 1)."""
+    return np.where(stable, 1.0, -1.0)[:, None] * np.column_stack([features, np.ones(len(stable))])
+
+
+def limits(stable, class_weights, c):
+    return c * np.where(stable, class_weights[1], class_weights[0])
+
+
+def rule_of(features, stable, class_weights, c):
+    found = fit_svm(features, stable, class_weights, c)
+    return np.append(found.weights, found.intercept)
+
+
+def objective(rule, rows, costs):
+    return rule @ rule / 2 + costs @ np.maximum(0, 1 - rows @ rule)
+
+
+def by_dual(rows, costs):
+    """The same minimum from the dual problem, which has bounds only."""
+    product = rows @ rows.T
+    found = minimize(
+        lambda a: a @ product @ a / 2 - a.sum(),
+        costs / 2,
+        jac=lambda a: product @ a - 1.0,
+        bounds=[(0.0, c) for c in costs],
+        method="L-BFGS-B",
+        options={"maxiter": 50_000, "maxfun": 100_000, "ftol": 1e-15, "gtol": 1e-10},
+    )
+    return found.x @ rows
+
+
+@pytest.mark.parametrize("c", [1e-5, 1e-2, 1.0])
+@pytest.mark.parametrize("class_weights", WEIGHTS)
+@pytest.mark.parametrize("d", [1, 4])
+def test_the_weights_are_those_of_a_general_solver(c, class_weights, d):
+    features, stable = samples(150, d)
+    rows, costs = signed(features, stable), limits(stable, class_weights, c)
+    found = rule_of(features, stable, class_weights, c)
+    np.testing.assert_allclose(found, by_dual(rows, costs), rtol=1e-4, atol=1e-4)
+
+
+def least_subgradient(rule, rows, costs):
+    """The least size of a subgradient at a rule: 0 at the minimum, by a linear programme."""
+    margins = rows @ rule
+    at_kink = np.abs(margins - 1) < 1e-4
+    fixed = rule - costs[margins < 1 - 1e-4] @ rows[margins < 1 - 1e-4]
+    kinks, d = rows[at_kink] * costs[at_kink][:, None], len(rule)
+    # min t: |fixed - sum_i m_i kinks_i| <= t in every part, with 0 <= m_i <= 1.
+    both = np.block([[-kinks.T, -np.ones((d, 1))], [kinks.T, -np.ones((d, 1))]])
+    bounds = [(0, 1)] * len(kinks) + [(0, None)]
+    cost = np.append(np.zeros(len(kinks)), 1.0)
+    return linprog(cost, both, np.append(-fixed, fixed), bounds=bounds).fun
+
+
+@pytest.mark.parametrize("c", [1e-5, 1.0, 1e3])
+@pytest.mark.parametrize("class_weights", WEIGHTS)
+@pytest.mark.parametrize("d", [1, 5, 30])
+def test_no_direction_descends(c, class_weights, d):
+    features, stable = samples(600, d)
+    rows, costs = signed(features, stable), limits(stable, class_weights, c)
+    rule = rule_of(features, stable, class_weights, c)
+    assert least_subgradient(rule, rows, costs) < 1e-4 * max(1.0, costs.sum() / 100)
+
+
+@pytest.mark.parametrize("c", [1e-5, 1.0, 1e3])
+def test_classes_that_are_apart_have_the_widest_margin(c):
+    features, stable = samples(shift=30.0)
+    rule = rule_of(features, stable, (1.0, 1.0), c)
+    rows = signed(features, stable)
+    if c >= 1.0:
+        assert (rows @ rule).min() == pytest.approx(1.0, abs=1e-3)
+    assert objective(rule, rows, limits(stable, (1.0, 1.0), c)) <= objective(
+        1.01 * rule, rows, limits(stable, (1.0, 1.0), c)
+    )
+
+
+def test_outliers_of_classes_that_are_apart_do_not_end_the_search_early():
+    features = np.random.default_rng(0).standard_t(2, size=(5000, 2))
+    stable = features[:, 0] > 0.3
+    rows, costs = signed(features, stable), limits(stable, (1.0, 1.0), 1e3)
+    rule = rule_of(features, stable, (1.0, 1.0), 1e3)
+    general = minimize(objective, rule, (rows, costs), "Nelder-Mead", options={"maxiter": 4000})
+    assert objective(rule, rows, costs) <= 1.0001 * general.fun
+    assert least_subgradient(rule, rows, costs) < 1e-2
+
+
+@pytest.mark.parametrize("c", [1.0, 1e3])
+def test_equal_columns_share_their_weight(c):
+    features, stable = samples(d=2)
+    twice = np.column_stack([features, features[:, 0], np.zeros(len(features))])
+    rule = rule_of(twice, stable, (1.0, 1.0), c)
+    assert np.isfinite(rule).all()
+    assert rule[2] == pytest.approx(rule[0], rel=1e-4, abs=1e-6)
+    assert rule[3] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_order_of_the_samples_does_not_matter():
+    features, stable = samples()
+    rule = rule_of(features, stable, WEIGHTS[1], 10.0)
+    other = rule_of(features[::-1], stable[::-1], WEIGHTS[1], 10.0)
+    np.testing.assert_allclose(rule, other, rtol=1e-5, atol=1e-6)
+
+
+def test_classes_that_change_places_turn_the_rule():
+    features, stable = samples()
+    rule = rule_of(features, stable, (0.6, 3.0), 1.0)
+    np.testing.assert_allclose(rule, -rule_of(features, ~stable, (3.0, 0.6), 1.0), atol=1e-5)
+
+
+def test_two_samples():
+    """Of v v / 2 + sum max(0, 1 - y v x): the margin of both is 1 and v lies between them."""
+    features, stable = np.array([[1.0], [-1.0]]), np.array([True, False])
+    np.testing.assert_allclose(rule_of(features, stable, (1.0, 1.0), 10.0), [1.0, 0.0], atol=1e-6)
+
+
+def test_the_same_samples_in_both_classes_leave_nothing_to_learn():
+    features = np.tile(np.random.default_rng(0).normal(size=(50, 3)), (2, 1))
+    stable = np.arange(100) < 50
+    rule = rule_of(features, stable, (1.0, 1.0), 1e3)
+    np.testing.assert_allclose(rule, 0.0, atol=1e-3)
