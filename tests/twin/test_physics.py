@@ -1,23 +1,15 @@
-"""Seven steps in C against the same steps called from Python, bit by bit."""
+"""Seven steps against the same ones by other functions of the binding, bit by bit."""
 
 import numpy as np
 import pytest
 
-from holdfast.twin import physics
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
 from holdfast.twin.grasp import closing_path
 from holdfast.twin.hand import GRAVITY, SUBSTEPS, TIMESTEP, HandModel
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import object_named
 from holdfast.twin.operator import NO_GUIDE, draw_tremor
-from holdfast.twin.physics import (
-    Action,
-    HalfSteps,
-    addresses_work,
-    advance_of,
-    advance_sample_by_calls,
-    engine_of,
-)
+from holdfast.twin.physics import Action
 from holdfast.twin.steps import (
     GUIDE_STIFFNESS,
     JERK,
@@ -105,13 +97,13 @@ ACTIONS = {
 @pytest.mark.parametrize("words", ACTIONS.values(), ids=ACTIONS)
 def test_a_sample_is_its_steps_called_from_python(words):
     compiled, plain = made_world(), made_world()
-    engine = engine_of(compiled.hand.model, compiled.hand.data)
     worst, loads = [], 0.0
     for sample in range(60):
         target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))  # closes until it presses
         given = [action(one, **words) for one in (compiled, plain)]
-        error = advance_sample(engine, compiled._physics, sample * SUBSTEPS, target, given[0])
-        ticks = range(sample * SUBSTEPS, (sample + 1) * SUBSTEPS)
+        tick = sample * SUBSTEPS
+        error = advance_sample(*compiled._half_steps, compiled._physics, tick, target, given[0])
+        ticks = range(tick, tick + SUBSTEPS)
         worst.append(max(step_from_python(plain, tick, target, given[1]) for tick in ticks))
         assert error == worst[-1]
         assert compiled.hand.data.time == plain.hand.data.time
@@ -127,92 +119,24 @@ def test_a_sample_is_its_steps_called_from_python(words):
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"n": -1}, "out of range"),
-        ({"per_control": 0}, "out of range"),
-        ({}, "engine"),
-    ],
+    ("tick", "change"), [(-1, {}), (0, {"n_steps": -1}), (0, {"per_control": 0})]
 )
-def test_numbers_that_no_step_could_use_are_refused(change, message):
+def test_numbers_that_no_step_could_use_are_refused(tick, change):
     world = made_world()
-    given = world._physics._replace(steps=world._physics.steps._replace(**change))
-    with pytest.raises(ValueError, match=message):
-        advance_sample(HalfSteps(1, 1, 1, 0), given, 0, np.zeros(16), action(world))
+    given = world._physics._replace(**change)
+    with pytest.raises(ValueError, match="out of range"):
+        advance_sample(*world._half_steps, given, tick, np.zeros(16), action(world))
 
 
-@pytest.fixture
-def unchecked():
-    """The check runs again, in the test and after it."""
-    addresses_work.cache_clear()
-    yield
-    addresses_work.cache_clear()
+@pytest.mark.parametrize("n_calls", [1, 2, 3, 4])
+def test_an_exception_of_a_half_step_is_raised(n_calls):
+    world, calls = made_world(), []
 
+    def half_step():
+        calls.append(1)
+        if len(calls) == n_calls:
+            raise KeyError("stopped")
 
-def stepped(world, n_samples=60):
-    """The state after some samples in which the fingers close on the pushed object."""
-    pushed = {"style": PUSH, "hold": 0.0, "elapsed": 0.2}
-    worst = 0.0
-    for sample in range(n_samples):
-        target = PATH.targets(np.full(4, 0.003 - 6e-4 * sample))
-        error = world._advance(world._physics, sample * SUBSTEPS, target, action(world, **pushed))
-        worst = max(worst, error)
-    data = world.hand.data
-    state = [data.qpos, data.qvel, data.xfrc_applied, data.qfrc_applied, world.bodies]
-    return [array.tobytes() for array in (*state, *world.contact, *world._physics.wrenches)], worst
-
-
-def test_the_addresses_work_here(unchecked):
-    assert addresses_work()
-    assert advance_of(HandModel.build(ITEM)).func is advance_sample
-
-
-class NoAddress:
-    """A stand-in of `mujoco` whose functions are all there, but not its addresses."""
-
-    def __getattr__(self, name):
-        if name == "_functions":
-            raise AttributeError(name)
-        return getattr(mujoco, name)
-
-
-class OtherVersion:
-    """A stand-in of MuJoCo's library that is of another version."""
-
-    def __init__(self, library):
-        self.mj_step1, self.mj_step2 = library.mj_step1, library.mj_step2
-
-    def mj_version(self):
-        return 1
-
-
-def no_addresses(patch):
-    physics._library.cache_clear()
-    patch.setattr(physics, "mujoco", NoAddress())
-
-
-def other_version(patch):
-    other = OtherVersion(physics._library())
-    patch.setattr(physics, "_library", lambda: other)
-
-
-def no_number(patch):
-    real = physics.engine_of
-    patch.setattr(
-        physics, "engine_of", lambda model, data: real(model, data)._replace(model=data._address)
-    )
-
-
-@pytest.mark.parametrize("break_it", [no_addresses, other_version, no_number])
-def test_without_addresses_the_public_functions_give_the_same_bytes(
-    break_it, unchecked, monkeypatch
-):
-    by_address = stepped(made_world())
-    addresses_work.cache_clear()
-    with monkeypatch.context() as patch:
-        break_it(patch)
-        world = made_world()
-        assert not addresses_work()
-    assert world._advance.func is advance_sample_by_calls
-    assert stepped(world) == by_address
-    assert by_address[1] > 0
+    with pytest.raises(KeyError, match="stopped"):
+        advance_sample(half_step, half_step, world._physics, 0, np.zeros(16), action(world))
+    assert len(calls) == n_calls

@@ -102,7 +102,11 @@ REFUSED = {
     "tick": (lambda: controlled(tick=-1), ValueError, "out of range"),
     "large tick": (lambda: controlled(tick=2**63), OverflowError, "too big"),
     "axis": (lambda: steps.tremor_at(TREMOR, 0.0, 3), ValueError, "out of range"),
-    "physics": (lambda: steps.apply_all(None, 0, 0, HALF, None, 0.0), AttributeError, "steps"),
+    "physics": (
+        lambda: steps.advance_sample(None, None, None, 0, HALF, None),
+        AttributeError,
+        "arrays",
+    ),
     "line": (lambda: read(line=0), ValueError, "line"),
     "drawn": (lambda: read(90), ValueError, "line"),
     "readings": (lambda: read(limits=np.ones(3, np.uint16)), TypeError, "limits"),

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 
-import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -31,9 +30,6 @@ def fingertip_force(
     /,
 ) -> None:
     """Fill rows first to stop of `out` (n, 3) with the force of readings (n, n_taxels, 3)."""
-
-def parse_counts(text: bytes | msgspec.Raw, integers: bytes | msgspec.Raw, /) -> bytearray | None:
-    """Return the counts (uint16) of the two forms of a sensor; None for unusual or other ones."""
 
 LANES: int
 """Partial sums of a sum over taxels; arrays of taxels are padded to a multiple of it."""

@@ -14,7 +14,6 @@
 
 #include "arrays.h"
 #include "batch.h"
-#include "counts.h"
 #include "detector.h"
 #include "finger.h"
 
@@ -96,28 +95,6 @@ static int read_arrays(
 }
 
 #include "module_batch.c"
-
-static PyObject *parse_counts(PyObject *Py_UNUSED(module), PyObject *const *args, Py_ssize_t n_args)
-{
-    Py_buffer text, list;
-    if (check_count(n_args, 2) < 0 || PyObject_GetBuffer(args[0], &text, PyBUF_SIMPLE) < 0) {
-        return NULL;
-    }
-    PyObject *counts = NULL;
-    if (PyObject_GetBuffer(args[1], &list, PyBUF_SIMPLE) == 0) {
-        counts = PyByteArray_FromStringAndSize(NULL, text.len / 5 * 2);
-        if (counts != NULL &&
-            (list.len == 0 || !holdfast_parse_counts(
-                                  text.buf, (size_t)text.len, list.buf, (size_t)list.len,
-                                  (uint16_t *)PyByteArray_AsString(counts)))) {
-            Py_DECREF(counts);
-            counts = Py_NewRef(Py_None);
-        }
-        PyBuffer_Release(&list);
-    }
-    PyBuffer_Release(&text);
-    return counts;
-}
 
 enum { N_STREAM_PARTS = 8, MAX_BLOCKS = 8 };
 
@@ -368,7 +345,6 @@ static PyMethodDef functions[] = {
     METHOD(fingertip_force, fingertip_force),
     METHOD(logistic, logistic),
     METHOD(replay, replay),
-    {"parse_counts", (PyCFunction)(void (*)(void))parse_counts, METH_FASTCALL, NULL},
     {NULL, NULL, 0, NULL},
 };
 

@@ -1,12 +1,14 @@
 """Functions in C (`c/steps.h`). They refuse all but arrays in C order of the right shape."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from holdfast.sensors.types import Array
 from holdfast.twin.contact import Constants, Contact
 from holdfast.twin.control import Controller
 from holdfast.twin.hand import HandArrays
-from holdfast.twin.physics import Action, HalfSteps, Physics
+from holdfast.twin.physics import Action, Physics
 from holdfast.twin.uskin_readout import Counts, _Constants, _State
 
 Wrench = tuple[float, float, float, float, float, float]
@@ -140,22 +142,24 @@ def disturb_wrench(
     """Return the wrench of a disturbance; `origin` (12,) is the pose when it began."""
 
 def advance_sample(
-    engine: HalfSteps, physics: Physics, tick: int, target: Array, action: Action, /
+    first_half: Callable[[], None],
+    second_half: Callable[[], None],
+    physics: Physics,
+    tick: int,
+    target: Array,
+    action: Action,
+    /,
 ) -> float:
     """Advance the physics by a sample; return the largest error of a set-point [rad].
 
     Args:
-        engine: model and state of MuJoCo.
+        first_half: `mj_step1` of MuJoCo's model and state.
+        second_half: `mj_step2` of them.
         physics: everything else; it is written.
         tick: number of the first step.
         target: (16,) set-points of the joints [rad].
         action: what the operator does.
     """
-
-def apply_all(
-    physics: Physics, tick: int, k: int, target: Array, action: Action, time: float, /
-) -> float:
-    """Apply all forces of step `k` of a sample, as `advance_sample` between the half steps."""
 
 def saturated(newtons: float, limit: float, /) -> float:
     """Return a reading that saturates at a limit [N]."""

@@ -1,6 +1,7 @@
 """Physics of a grasp, step by step: hand, object, contact, controller, operator; and its truth."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from holdfast.twin.loads import LoadState
 from holdfast.twin.mujoco_import import mujoco
 from holdfast.twin.objects import GraspObject
 from holdfast.twin.operator import NO_GUIDE
-from holdfast.twin.physics import Action, Physics, Steps, Wrenches, advance_of
+from holdfast.twin.physics import Action, Physics
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
 from holdfast.twin.skin import COUPLED, COUPLED_PITCH, Skin
 from holdfast.twin.steps import (
@@ -30,6 +31,7 @@ from holdfast.twin.steps import (
     MU_STATIC,
     TIP_SLIP,
     TIP_SLIPPING_SHARE,
+    advance_sample,
     fill_bodies,
 )
 from holdfast.twin.surface import NODE_PITCH, Surface, curved_fingertip
@@ -127,12 +129,14 @@ class World(ContactWorld):
     ) -> None:
         super().__init__(hand, item, fingertip_of(coupled), COUPLED if coupled else Skin())
         self.path, self.controller, self.tremors = path, controller, tremors
-        self._advance = advance_of(hand)
-        steps = Steps(SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL)
         self._physics = Physics(
-            steps, hand.arrays, self.contact, self.constants, controller, self.bodies,
-            Wrenches(self.outside, np.zeros(6)),
+            hand.arrays, self.contact, self.constants, controller, self.bodies, self.outside,
+            np.zeros(6), SUBSTEPS, TIMESTEP, STEPS_PER_CONTROL,
         )  # fmt: skip
+        self._half_steps = (
+            partial(mujoco.mj_step1, hand.model, hand.data),
+            partial(mujoco.mj_step2, hand.model, hand.data),
+        )
         # What `set_load` sets; of the current disturbance its parameters, and the pose of the
         # object when it began, which C reads in place.
         self._pull, self._guide = np.zeros(6), NO_GUIDE
@@ -204,7 +208,9 @@ class World(ContactWorld):
             self.hand.data.time, self._parameters, self._origin, style, duration,
             command.elapsed, self._pull, self._guide,
         )  # fmt: skip
-        self.set_point_error = self._advance(self._physics, self._tick, target, action)
+        self.set_point_error = advance_sample(
+            *self._half_steps, self._physics, self._tick, target, action
+        )
         self._tick += SUBSTEPS
         if self.bodies[-1, 2] < MIN_HEIGHT:  # a fall without end would make the numbers useless
             self.hand.data.qvel[N_JOINTS:] = 0.0

@@ -92,14 +92,27 @@ static void run_disturb_wrench(arguments *a, double *out)
         a->body, a->anchor, a->parameters, a->style, a->duration, a->tremor, a->rms, a->elapsed);
 }
 
-static void run_advance_sample(arguments *a, double *out)
+static bool succeeds(PyObject *half_step)
 {
-    *out = advance_sample(&a->engine, &a->physics, a->tick, a->target, &a->action);
+    PyObject *const result = PyObject_CallNoArgs(half_step);
+    Py_XDECREF(result);
+    return result != NULL;
 }
 
-static void run_apply_all(arguments *a, double *out)
+/* Advance the physics by a sample; a half step that fails leaves its exception. MuJoCo's write no
+ * number that was checked. */
+static void run_advance_sample(arguments *a, double *out)
 {
-    *out = apply_all(&a->physics, a->tick, a->step, a->target, &a->action, a->time);
+    const physics *const p = &a->physics;
+    double time = a->action.time;
+    *out = 0.0;
+    for (int64_t k = 0; k < p->n_steps && succeeds(a->first_half); ++k) {
+        *out = larger(*out, apply_all(p, a->tick, k, a->target, &a->action, time));
+        if (!succeeds(a->second_half)) {
+            return;
+        }
+        time += p->period; /* as MuJoCo adds it */
+    }
 }
 
 static void run_saturated(arguments *a, double *out)
@@ -114,32 +127,11 @@ static void run_read_out(arguments *a, double *Py_UNUSED(out))
 
 /* A function of the module. */
 typedef struct {
-    const char *name;
-    field *fields;
+    PyMethodDef method; /* not const: so Python takes it */
+    const field *fields;
     void (*run)(arguments *, double *);
-    Py_ssize_t n_results;
+    const char *results; /* format of Py_BuildValue for at most six numbers */
 } function;
-
-static function functions[] = {
-    {"distances", distances_arguments, run_distances, 0},
-    {"probe", probe_arguments, run_probe, 4},
-    {"relief", probe_arguments, run_relief, 1},
-    {"touch", touch_arguments, run_touch, 0},
-    {"fill_bodies", fill_bodies_arguments, run_fill_bodies, 0},
-    {"apply_forces", apply_forces_arguments, run_apply_forces, 0},
-    {"on_object", on_object_arguments, run_on_object, 6},
-    {"control", control_arguments, run_control, 0},
-    {"fill_targets", fill_targets_arguments, run_fill_targets, 0},
-    {"tremor_at", tremor_at_arguments, run_tremor_at, 2},
-    {"aim", aim_arguments, run_aim, 2},
-    {"hold_wrench", hold_wrench_arguments, run_hold_wrench, 6},
-    {"guide_wrench", guide_wrench_arguments, run_guide_wrench, 6},
-    {"disturb_wrench", disturb_wrench_arguments, run_disturb_wrench, 6},
-    {"advance_sample", advance_sample_arguments, run_advance_sample, 1},
-    {"apply_all", apply_all_arguments, run_apply_all, 1},
-    {"saturated", saturated_arguments, run_saturated, 1},
-    {"read_out", read_out_arguments, run_read_out, 0},
-};
 
 /* Read an array and check its shape, or set an exception and return -1. */
 static int read_array(call *c, const field *f, PyObject *value, void *target)
@@ -175,18 +167,22 @@ static int read_array(call *c, const field *f, PyObject *value, void *target)
     return check_shape(a, expected);
 }
 
-/* Read the fields of an object, or set an exception and return -1. */
-static int read_struct(call *c, field *fields, PyObject *object, char *target);
+/* Read fields from the attributes of an object, or, if it is NULL, from arguments; or set an
+ * exception and return -1. */
+static int read_fields(
+    call *c, const field *fields, PyObject *object, PyObject *const *args, char *target);
 
-static int read_field(call *c, const field *f, PyObject *value, char *target)
+static int read_field(call *c, const field *f, PyObject *value, void *target)
 {
     if (f->kind == AN_ARRAY) {
         return read_array(c, f, value, target);
     }
     if (f->kind == A_STRUCT) {
-        return read_struct(c, f->fields, value, target);
+        return read_fields(c, f->fields, value, NULL, target);
     }
-    if (f->kind == A_REAL) {
+    if (f->kind == A_CALLABLE) {
+        *(PyObject **)target = value; /* the caller keeps it */
+    } else if (f->kind == A_REAL) {
         *(double *)target = PyFloat_AsDouble(value);
     } else {
         *(int64_t *)target = PyLong_AsLongLong(value);
@@ -194,17 +190,16 @@ static int read_field(call *c, const field *f, PyObject *value, char *target)
     return PyErr_Occurred() ? -1 : 0;
 }
 
-static int read_struct(call *c, field *fields, PyObject *object, char *target)
+static int read_fields(
+    call *c, const field *fields, PyObject *object, PyObject *const *args, char *target)
 {
-    for (field *f = fields; f->name != NULL; ++f) {
+    for (const field *f = fields; f->name != NULL; ++f) {
         if (f->kind == A_LENGTH) {
             *(size_t *)(target + f->offset) = (size_t)c->lengths[-f->axes[0]];
             continue;
         }
-        if (f->key == NULL && (f->key = PyUnicode_InternFromString(f->name)) == NULL) {
-            return -1;
-        }
-        PyObject *const value = PyObject_GetAttr(object, f->key);
+        PyObject *const value =
+            object == NULL ? Py_NewRef(*args++) : PyObject_GetAttrString(object, f->name);
         const int result = value == NULL ? -1 : read_field(c, f, value, target + f->offset);
         Py_XDECREF(value); /* its buffer, if any, keeps it */
         if (result < 0) {
@@ -217,9 +212,8 @@ static int read_struct(call *c, field *fields, PyObject *object, char *target)
 /* Return what is wrong with the numbers by which steps index or divide; NULL if they fit. */
 static const char *wrong_numbers(const call *c, const function *f, const arguments *a)
 {
-    const hand *const h = &a->physics.arrays;
-    const steps *const s = &a->physics.steps;
-    const half_steps *const e = &a->engine;
+    const physics *const p = &a->physics;
+    const hand *const h = &p->arrays;
     const int64_t most = INT64_MAX / 2; /* so that no sum overflows */
     if (c->lengths[-N_TIPS] >= 0 && c->lengths[-N_BODIES] >= 0 &&
         c->lengths[-N_BODIES] != c->lengths[-N_TIPS] + 1) {
@@ -242,42 +236,20 @@ static const char *wrong_numbers(const call *c, const function *f, const argumen
             return "first, grid: joints of the hand and two points of a path expected";
         }
     }
-    const constants *const k = &a->physics.constants;
+    const constants *const k = &p->constants;
     if (k->skin != NULL && k->skin->shear_modulus > 0.0 &&
         (k->n_coupled != k->n_nodes || k->n_nodes > MAX_COUPLED)) {
         return "nearness: a row for each node expected, and at most 1024 coupled nodes";
     }
-    if (a->tick < 0 || a->tick > most || a->step < 0 || a->step > most ||
-        (f->run == run_tremor_at && a->step > 2) ||
-        (a->physics.bodies != NULL && (s->n < 0 || s->n > most || s->per_control < 1))) {
+    if (a->tick < 0 || a->tick > most || a->step < 0 || a->step > 2 || p->n_steps < 0 ||
+        p->n_steps > most || (f->run == run_advance_sample && p->per_control < 1)) {
         return "a number of a step or an axis is out of range";
-    }
-    if (f->run == run_advance_sample && !(e->first_half && e->second_half && e->model && e->data)) {
-        return "engine: an address is 0";
     }
     if (f->run == run_read_out &&
         (a->constants.line < 1 || c->lengths[-N_DRAWN] != 1 + 3 * c->lengths[-N_TAXELS])) {
         return "line: at least 1 expected; drawn: 1 + 3 numbers for each taxel";
     }
     return NULL;
-}
-
-/* Return None, a number, or a tuple of numbers. */
-static PyObject *results(const double *numbers, Py_ssize_t n)
-{
-    if (n < 2) {
-        return n == 0 ? Py_NewRef(Py_None) : PyFloat_FromDouble(*numbers);
-    }
-    PyObject *const tuple = PyTuple_New(n);
-    for (Py_ssize_t i = 0; tuple != NULL && i < n; ++i) {
-        PyObject *const number = PyFloat_FromDouble(numbers[i]);
-        if (number == NULL) {
-            Py_DECREF(tuple);
-            return NULL;
-        }
-        PyTuple_SetItem(tuple, i, number);
-    }
-    return tuple;
 }
 
 /* Call a function of the table, which is in the capsule. */
@@ -288,33 +260,52 @@ static PyObject *run(PyObject *capsule, PyObject *const *args, Py_ssize_t n_args
     call c = {0};
     memset(c.lengths, -1, sizeof c.lengths);
     PyObject *result = NULL;
-    double numbers[6];
+    double x[6] = {0};
     Py_ssize_t n = 0;
     for (const field *argument = f->fields; argument->name != NULL; ++argument) {
-        char *const target = (char *)&a + argument->offset;
-        if (argument->kind == A_LENGTH) {
-            *(size_t *)target = (size_t)c.lengths[-argument->axes[0]];
-        } else if (n++ >= n_args) {
-            continue; /* to count them */
-        } else if (read_field(&c, argument, args[n - 1], target) < 0) {
-            goto done;
-        }
+        n += argument->kind != A_LENGTH;
     }
     if (n != n_args) {
-        PyErr_Format(PyExc_TypeError, "%s: %zd arguments expected, %zd given", f->name, n, n_args);
-        goto done;
+        return PyErr_Format(
+            PyExc_TypeError, "%s: %zd arguments expected, %zd given", f->method.ml_name, n, n_args);
     }
-    const char *const wrong = wrong_numbers(&c, f, &a);
-    if (wrong != NULL) {
-        PyErr_SetString(PyExc_ValueError, wrong);
-    } else {
-        f->run(&a, numbers);
-        result = results(numbers, f->n_results);
+    if (read_fields(&c, f->fields, NULL, args, (char *)&a) == 0) {
+        const char *const wrong = wrong_numbers(&c, f, &a);
+        if (wrong != NULL) {
+            PyErr_SetString(PyExc_ValueError, wrong);
+        } else {
+            f->run(&a, x);
+            result = PyErr_Occurred()
+                         ? NULL
+                         : Py_BuildValue(f->results, x[0], x[1], x[2], x[3], x[4], x[5]);
+        }
     }
-done:
     release(c.arrays, c.n_arrays);
     return result;
 }
+
+/* clang-format off */
+#define METHOD(name) {name, (PyCFunction)(void (*)(void))run, METH_FASTCALL, NULL}
+/* clang-format on */
+static function functions[] = {
+    {METHOD("distances"), distances_arguments, run_distances, ""},
+    {METHOD("probe"), probe_arguments, run_probe, "dddd"},
+    {METHOD("relief"), probe_arguments, run_relief, "d"},
+    {METHOD("touch"), touch_arguments, run_touch, ""},
+    {METHOD("fill_bodies"), fill_bodies_arguments, run_fill_bodies, ""},
+    {METHOD("apply_forces"), apply_forces_arguments, run_apply_forces, ""},
+    {METHOD("on_object"), on_object_arguments, run_on_object, "dddddd"},
+    {METHOD("control"), control_arguments, run_control, ""},
+    {METHOD("fill_targets"), fill_targets_arguments, run_fill_targets, ""},
+    {METHOD("tremor_at"), tremor_at_arguments, run_tremor_at, "dd"},
+    {METHOD("aim"), aim_arguments, run_aim, "dd"},
+    {METHOD("hold_wrench"), hold_wrench_arguments, run_hold_wrench, "dddddd"},
+    {METHOD("guide_wrench"), guide_wrench_arguments, run_guide_wrench, "dddddd"},
+    {METHOD("disturb_wrench"), disturb_wrench_arguments, run_disturb_wrench, "dddddd"},
+    {METHOD("advance_sample"), advance_sample_arguments, run_advance_sample, "d"},
+    {METHOD("saturated"), saturated_arguments, run_saturated, "d"},
+    {METHOD("read_out"), read_out_arguments, run_read_out, ""},
+};
 
 /* Columns of arrays, and other whole numbers of the C files that Python uses too. */
 #define COLUMN(type, member) ((long)(offsetof(type, member) / sizeof(double)))
@@ -350,18 +341,16 @@ static int add_object(PyObject *module, const char *name, PyObject *object)
 }
 
 #define N_OF(table) (sizeof(table) / sizeof((table)[0]))
-static PyMethodDef methods[N_OF(functions)];
 
 static int add_contents(PyObject *module)
 {
     int result = PyModule_AddStringConstant(module, "SOURCES", HOLDFAST_SOURCES);
     for (size_t i = 0; result == 0 && i < N_OF(functions); ++i) {
-        methods[i] =
-            (PyMethodDef){functions[i].name, (PyCFunction)(void (*)(void))run, METH_FASTCALL, NULL};
+        PyMethodDef *const method = &functions[i].method;
         PyObject *const capsule = PyCapsule_New(&functions[i], NULL, NULL);
-        PyObject *const made = capsule == NULL ? NULL : PyCFunction_New(&methods[i], capsule);
+        PyObject *const made = capsule == NULL ? NULL : PyCFunction_New(method, capsule);
         Py_XDECREF(capsule);
-        result = add_object(module, functions[i].name, made);
+        result = add_object(module, method->ml_name, made);
     }
     for (size_t i = 0; result == 0 && i < N_OF(whole_numbers); ++i) {
         result = PyModule_AddIntConstant(module, whole_numbers[i].name, whole_numbers[i].value);

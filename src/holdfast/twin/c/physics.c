@@ -1,13 +1,5 @@
-/* One sample of physics: a few steps of MuJoCo, contact, operator and controller.
- *
- * MuJoCo's half steps are called by their addresses, because a call from Python with its arrays
- * costs as much as the half step; see physics.py. */
+/* The forces between MuJoCo's half steps: contact, operator, controller. */
 #include "steps.h"
-
-/* Addresses of MuJoCo's half steps, of a model and of its state. */
-typedef struct {
-    int64_t first_half, second_half, model, data;
-} half_steps;
 
 /* What the operator does during a sample, and the loads on the object: see `Action`. */
 typedef struct {
@@ -24,27 +16,17 @@ typedef struct {
     size_t n_sinusoids;
 } action;
 
-/* The steps of a sample. */
-typedef struct {
-    int64_t n;
-    double period;       /* of a step, that of the model [s] */
-    int64_t per_control; /* steps in a step of the controller */
-} steps;
-
-/* Force and torque on the object: of operator and loads, and with the fingers'. */
-typedef struct {
-    wrench *outside, *total;
-} wrenches;
-
 /* State of hand, object and contact, which a step writes in place, and what it needs. */
 typedef struct {
-    steps steps;
     hand arrays;
     contact contact;
     constants constants;
     controller controller;
     body *bodies;
-    wrenches wrenches;
+    wrench *outside, *total; /* on the object: of operator and loads, and with the fingers' */
+    int64_t n_steps;         /* of a sample */
+    double period;           /* of a step, that of the model [s] */
+    int64_t per_control;     /* steps in a step of the controller */
 } physics;
 
 static void add_wrench(wrench *sum, wrench w)
@@ -54,10 +36,9 @@ static void add_wrench(wrench *sum, wrench w)
 }
 
 /* Fill force and torque on the object: of operator and loads, and with the fingers'. */
-static void operate(
-    const action *a, const body *object, const wrench *fingers, double time, double elapsed,
-    const wrenches *out)
+static void operate(const physics *p, const action *a, double time, double elapsed)
 {
+    const body *const object = &p->bodies[p->contact.n_tips];
     const tremor holding = {a->tremors, a->n_sinusoids};
     const tremor disturbing = {a->tremors + 3 * a->n_sinusoids, a->n_sinusoids};
     wrench outside = {{0.0, 0.0, 0.0}, {0.0, 0.0, 0.0}};
@@ -74,55 +55,31 @@ static void operate(
     if (a->guide->stiffness > 0.0) {
         add_wrench(&outside, guide_wrench(object, a->guide, time - a->time, disturbing, time));
     }
-    *out->total = outside;
-    add_wrench(out->total, *fingers);
+    *p->total = outside;
+    add_wrench(p->total, *p->contact.wrench);
     add_wrench(&outside, *a->pull);
-    add_wrench(out->total, *a->pull);
-    *out->outside = outside;
+    add_wrench(p->total, *a->pull);
+    *p->outside = outside;
 }
 
-/* Apply all forces of step k of a sample, between MuJoCo's half steps.
+/* Apply all forces of step k of a sample, whose first step has the number `tick`.
  *
- * Return the largest error of a set-point, in a glitch of the controller [rad]; 0 between the steps
- * of the controller. */
+ * `target` are set-points of the joints [rad], `time` is MuJoCo's [s]. Return the largest error of
+ * a set-point, in a glitch of the controller [rad]; 0 between the steps of the controller.
+ */
 static double apply_all(
     const physics *p, int64_t tick, int64_t k, const double *target, const action *a, double time)
 {
-    const steps *const s = &p->steps;
     fill_bodies(&p->arrays, p->bodies);
-    touch(&p->contact, &p->constants, p->bodies, s->period);
-    const double elapsed = a->elapsed + (double)k * s->period;
-    const body *const object = &p->bodies[p->contact.n_tips];
-    operate(a, object, p->contact.wrench, time, elapsed, &p->wrenches);
-    apply_forces(&p->arrays, p->contact.tips, p->wrenches.total, p->bodies);
-    if ((tick + k) % s->per_control != 0) {
+    touch(&p->contact, &p->constants, p->bodies, p->period);
+    operate(p, a, time, a->elapsed + (double)k * p->period);
+    apply_forces(&p->arrays, p->contact.tips, p->total, p->bodies);
+    if ((tick + k) % p->per_control != 0) {
         return 0.0;
     }
-    const int64_t number = (tick + k) / s->per_control;
+    const int64_t number = (tick + k) / p->per_control;
     control(
         &p->controller, number, p->arrays.qpos, p->arrays.qfrc_bias, target,
-        (double)s->per_control * s->period, p->arrays.qfrc_applied);
+        (double)p->per_control * p->period, p->arrays.qfrc_applied);
     return glitch(&p->controller, number);
-}
-
-/* Advance the physics by one sample, whose first step has the number `tick`.
- *
- * `target` are set-points of the joints [rad]. Return the largest error of a set-point, in a glitch
- * of the controller [rad]. */
-static double advance_sample(
-    const half_steps *engine, const physics *p, int64_t tick, const double *target, const action *a)
-{
-    typedef void half_step(void *model, void *data);
-    half_step *const first_half = (half_step *)(uintptr_t)engine->first_half;
-    half_step *const second_half = (half_step *)(uintptr_t)engine->second_half;
-    void *const model = (void *)(uintptr_t)engine->model, *const data =
-                                                              (void *)(uintptr_t)engine->data;
-    double worst = 0.0, time = a->time;
-    for (int64_t k = 0; k < p->steps.n; ++k) {
-        first_half(model, data);
-        worst = larger(worst, apply_all(p, tick, k, target, a, time));
-        second_half(model, data);
-        time += p->steps.period; /* as MuJoCo adds it */
-    }
-    return worst;
 }

@@ -3,8 +3,8 @@
  * A sample of the sensor is a few steps. In each, MuJoCo moves the bodies by half a step; hand.c
  * reads where fingertips and object are; contact.c computes the forces between skin (skin.c,
  * coupled.c) and object (shapes.c), operator.c those of a person, control.c the torques of the
- * motors; hand.c applies all of them; MuJoCo moves the bodies by the other half. physics.c is this
- * loop. uskin_readout.c makes counts of the forces on the taxels.
+ * motors; hand.c applies all of them; MuJoCo moves the bodies by the other half. physics.c does
+ * what is between the halves. uskin_readout.c makes counts of the forces on the taxels.
  *
  * Structs of numbers below are rows of NumPy's arrays; module.c gives their columns to Python.
  * The caller owns all memory, and nothing is allocated. The order of every sum is part of the

@@ -3,7 +3,6 @@
 import re
 from array import array
 from collections.abc import Mapping
-from contextlib import suppress
 from typing import Annotated, Any, NamedTuple
 
 import msgspec
@@ -12,7 +11,6 @@ import numpy.typing as npt
 
 from holdfast.devices.sources.assembler import SEQUENCE_PERIOD
 from holdfast.devices.sources.timeline import is_plausible
-from holdfast.kernel import _extension
 
 ROUTINE_TYPE = "routine"
 """Type of packets with samples; packets have a type since version 1.8."""
@@ -22,8 +20,6 @@ MAX_REASON_LENGTH = 160
 """Longest reason of the JSON decoder in a message [characters]."""
 
 _NOT_A_NUMBER = re.compile(rb"-?\b(?:NaN|Infinity)\b")
-
-_NULL = msgspec.Raw(b"null")
 
 Model = Annotated[str, msgspec.Meta(max_length=MAX_MODEL_NAME_LENGTH)]
 
@@ -73,7 +69,7 @@ class Counts(msgspec.Struct):
                 "four hexadecimal digits a number expected in data, with commas between"
             )
         try:
-            digits = bytes.fromhex(text.replace(",", ""))
+            digits = bytes.fromhex(text.replace(",", " "))  # a text of another length takes longer
         except ValueError as cause:
             raise InvalidPacket(
                 "data contains characters that are no hexadecimal digits"
@@ -85,33 +81,6 @@ class Counts(msgspec.Struct):
         if self.integer and _from_integers(self.integer).tobytes() != counts.tobytes():
             raise InvalidPacket("data and integer differ")
         return _points(counts)
-
-
-class PlainCounts(msgspec.Struct):
-    """Sensor of a packet, with readings in counts in the forms that the server writes."""
-
-    taxels: int | None
-    time: float | None
-    model: str
-    counts: npt.NDArray[np.uint16]
-
-    def readings(self) -> npt.NDArray[np.uint16]:
-        """Return (n_taxels, 3) in counts.
-
-        Raises:
-            InvalidPacket: the number of values is no multiple of three.
-        """
-        return _points(self.counts)
-
-
-class _RawCounts(msgspec.Struct):
-    """Sensor of a packet, with readings that are not parsed yet."""
-
-    taxels: int | None = None
-    time: float | None = None
-    model: Model = ""
-    data: msgspec.Raw = _NULL
-    integer: msgspec.Raw = _NULL
 
 
 class Calibrated(msgspec.Struct):
@@ -136,7 +105,6 @@ class Calibrated(msgspec.Struct):
 _PACKET = msgspec.json.Decoder(dict[str, msgspec.Raw])
 _ANY = msgspec.json.Decoder()
 _COUNTS = msgspec.json.Decoder(Counts)
-_RAW_COUNTS = msgspec.json.Decoder(_RawCounts)
 _CALIBRATED = msgspec.json.Decoder(Calibrated)
 
 
@@ -182,23 +150,14 @@ def read_packet(text: str | bytes) -> Packet | None:
     return Packet(counter, _stamp(time), known, ordered)
 
 
-def read_sensor(raw: msgspec.Raw, *, calibrated: bool) -> PlainCounts | Counts | Calibrated:
+def read_sensor(raw: msgspec.Raw, *, calibrated: bool) -> Counts | Calibrated:
     """Parse a sensor of a packet, with its readings in counts or in newtons.
 
     Raises:
         InvalidPacket: it is no JSON object, or a field has another type than expected.
     """
     try:
-        part: PlainCounts | Counts | Calibrated | None = None
-        if not calibrated:
-            # The form in which the server writes counts is parsed in C, which is faster.
-            with suppress(ValueError, RecursionError):
-                plain = _RAW_COUNTS.decode(raw)
-                parsed = _extension.parse_counts(plain.data, plain.integer)
-                if parsed is not None:
-                    counts = np.frombuffer(parsed, np.uint16)
-                    part = PlainCounts(plain.taxels, plain.time, plain.model, counts)
-        part = part or (_CALIBRATED if calibrated else _COUNTS).decode(raw)
+        part: Counts | Calibrated = (_CALIBRATED if calibrated else _COUNTS).decode(raw)
     except (ValueError, RecursionError) as cause:
         raise InvalidPacket(str(cause)[:MAX_REASON_LENGTH]) from cause
     if part.time is not None:
