@@ -25,7 +25,7 @@ def stream():
 
 
 FIRST_RELATIVE = len(HOLDFAST_FEATURES)
-PLACES = {"fingers": 1, "features": 2, "lags": 3, "used": 4, "rotations": 5, "places": 6}
+PLACES = {"fingers": 1, "features": 2, "lags": 3, "used": 4, "rotations": 5, "positions": 6}
 
 
 def refused(stream, change):
@@ -88,8 +88,8 @@ class TestCheck:
             ("used.3", 0.5, "used"),
             ("used.3", np.nan, "used"),
             ("used.3", 0.0, "n_used of a finger"),
-            ("rotations.5", np.inf, "a rotation or a place of a taxel"),
-            ("places.5", np.nan, "a rotation or a place of a taxel"),
+            ("rotations.5", np.inf, "a rotation or a position of a taxel"),
+            ("positions.5", np.nan, "a rotation or a position of a taxel"),
         ],
     )
     def test_what_does_not_fit_is_named(self, stream, field, value, wrong):

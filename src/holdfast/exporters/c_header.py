@@ -111,7 +111,7 @@ class Tables:
         self.structs, self.texts, self.n_bytes = structs_of(kernel), list[str](), 0
         self._single = single
         tables = FeatureStream(plan).tables()
-        hand, fingers, features, lags, used, rotations, places, baseline = tables
+        hand, fingers, features, lags, used, rotations, positions, baseline = tables
         rules, heads, weights = rules_of(model, plan)
         n_heads = len(HEAD_NAMES)
         own_heads = [{"heads": heads[k : k + n_heads]} for k in range(0, len(heads), n_heads)]
@@ -128,7 +128,7 @@ class Tables:
         no_lag: Struct = {field.name: 0 for field in self.structs["holdfast_lag"]}
         self._add("holdfast_lag", "lags", lags or [no_lag])  # C has no empty arrays
         for name, values in (
-            ("used", used), ("rotations", rotations), ("places", places), ("weights", weights),
+            ("used", used), ("rotations", rotations), ("positions", positions), ("weights", weights),
             *[("baseline", baseline)] * self.has_baseline,
         ):  # fmt: skip
             self._add("hf_real", name, values.ravel().tolist())

@@ -65,7 +65,7 @@ class Stream:
         lags: list[dict[str, object]],
         used: npt.NDArray[np.float64],
         rotations: npt.NDArray[np.float64],
-        places: npt.NDArray[np.float64],
+        positions: npt.NDArray[np.float64],
         baseline: npt.NDArray[np.float64],
         /,
     ) -> Stream: ...

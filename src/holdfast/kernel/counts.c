@@ -38,29 +38,29 @@ static bool parse_text(const char *text, size_t n, uint16_t *counts)
  * Its last character is checked first: spaces and digits end there. */
 static bool has_counts(const char *list, size_t n, const uint16_t *counts, size_t n_counts)
 {
-    size_t place = 1;
+    size_t index = 1;
     if (n < 2 || list[0] != '[' || list[n - 1] != ']') {
         return false;
     }
     for (size_t i = 0; i < n_counts; ++i) {
-        for (; list[place] == ' '; ++place) {
+        for (; list[index] == ' '; ++index) {
         }
-        const size_t begin = place;
+        const size_t begin = index;
         uint32_t value = 0;
-        for (; list[place] >= '0' && list[place] <= '9' && place <= begin + MAX_DECIMALS; ++place) {
-            value = 10 * value + (uint32_t)(list[place] - '0');
+        for (; list[index] >= '0' && list[index] <= '9' && index <= begin + MAX_DECIMALS; ++index) {
+            value = 10 * value + (uint32_t)(list[index] - '0');
         }
-        if (place == begin || place > begin + MAX_DECIMALS || value != counts[i]) {
+        if (index == begin || index > begin + MAX_DECIMALS || value != counts[i]) {
             return false;
         }
-        for (; list[place] == ' '; ++place) {
+        for (; list[index] == ' '; ++index) {
         }
-        if (list[place] != (i + 1 < n_counts ? ',' : ']')) {
+        if (list[index] != (i + 1 < n_counts ? ',' : ']')) {
             return false;
         }
-        ++place;
+        ++index;
     }
-    return place == n;
+    return index == n;
 }
 
 bool holdfast_parse_counts(

@@ -30,8 +30,8 @@ HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *a
             continue;
         }
         for (size_t axis = 0; axis < 3; ++axis) {
-            const size_t place = axis * f->n + i;
-            f->masks[i].fade[axis] += f->previous[place] - f->readings[place];
+            const size_t index = axis * f->n + i;
+            f->masks[i].fade[axis] += f->previous[index] - f->readings[index];
         }
     }
 }
@@ -77,9 +77,9 @@ static void hf_beyond_rest(const hf_finger *f, size_t i, hf_real beyond[3])
     const hf_real *const turn = f->rotations;
     const hf_real x = f->reference[i], y = f->reference[n + i], z = f->reference[2 * n + i];
     for (size_t axis = 0; axis < 3; ++axis) {
-        const size_t place = axis * n + i;
-        beyond[axis] = f->readings[place] - f->baseline[place] -
-                       (turn[place] * x + turn[3 * n + place] * y + turn[6 * n + place] * z);
+        const size_t index = axis * n + i;
+        beyond[axis] = f->readings[index] - f->baseline[index] -
+                       (turn[index] * x + turn[3 * n + index] * y + turn[6 * n + index] * z);
     }
 }
 

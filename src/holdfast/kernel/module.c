@@ -246,11 +246,11 @@ static double *read_numbers(stream *s, PyObject *object, const char *name, size_
 /* Fill the tables of a stream, or set an exception and return -1. */
 static int read_tables(stream *s, PyObject *args)
 {
-    PyObject *hand, *fingers, *features, *lags, *used, *rotations, *places, *baseline;
+    PyObject *hand, *fingers, *features, *lags, *used, *rotations, *positions, *baseline;
     holdfast_hand *const h = &s->hand;
     if (!PyArg_ParseTuple(
             args, "O!O!O!O!OOOO:Stream", &PyDict_Type, &hand, &PyList_Type, &fingers, &PyList_Type,
-            &features, &PyList_Type, &lags, &used, &rotations, &places, &baseline) ||
+            &features, &PyList_Type, &lags, &used, &rotations, &positions, &baseline) ||
         read_struct(hand, hand_fields, h) < 0) {
         return -1;
     }
@@ -267,7 +267,7 @@ static int read_tables(stream *s, PyObject *args)
         !(h->lags = read_structs(s, lags, h->n_lags, lag_fields, sizeof *h->lags)) ||
         !(h->used = read_numbers(s, used, "used", h->n_lanes)) ||
         !(h->rotations = read_numbers(s, rotations, "rotations", 9 * h->n_lanes)) ||
-        !(h->places = read_numbers(s, places, "places", 3 * h->n_lanes))) {
+        !(h->positions = read_numbers(s, positions, "positions", 3 * h->n_lanes))) {
         return -1;
     }
     const char *const wrong = holdfast_check(h);
@@ -283,7 +283,7 @@ static int read_tables(stream *s, PyObject *args)
     if (block == NULL || s->present == NULL) {
         return -1;
     }
-    holdfast_place(h, &s->memory, block);
+    holdfast_use_memory(h, &s->memory, block);
     array a = {0};
     int result = get_array('d', baseline, "baseline", 2, PyBUF_SIMPLE, &a);
     if (result == 0) {

@@ -1,4 +1,4 @@
-/* One sample of a hand, in the order of kernel.h: is it valid and true, changes, tare, field,
+/* One sample of a hand, in the order of kernel.h: is it valid and plausible, changes, tare, field,
  * masks, force and features. */
 #include "finger.h"
 
@@ -18,7 +18,7 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.n = hf_n_lanes(finger->n_taxels);
     f.used = hand->used + first;
     f.rotations = hand->rotations + 9 * first;
-    f.places = hand->places + 3 * first;
+    f.positions = hand->positions + 3 * first;
     f.readings = memory->readings + 3 * first;
     f.previous = memory->previous + 3 * first;
     f.baseline = memory->baseline + 3 * first;
@@ -188,11 +188,11 @@ static int32_t hf_process(const hf_finger *f, double time)
         }
         scan = hf_scan_readings(f, f->readings);
     }
-    /* Before the sample is counted: one that cannot be true reaches no tare, force or window. */
-    const uint32_t untrue = hf_find_untrue(f, &scan);
-    if (untrue) {
+    /* Before the sample is counted: an implausible one reaches no tare, force or window. */
+    const uint32_t implausible = hf_find_implausible(f, &scan);
+    if (implausible) {
         s->n_stretch = 0;
-        v->faults |= untrue;
+        v->faults |= implausible;
         return HOLDFAST_FAULT;
     }
     hf_track_changes(f, time, after_gap);
