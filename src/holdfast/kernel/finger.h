@@ -246,10 +246,10 @@ HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan);
 HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
 
 /* field.c */
-HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out);
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f);
 
 /* masks.c */
-HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit);
+HF_SHARED void hf_note_saturated(const hf_finger *f);
 HF_SHARED void hf_hold_lost(const hf_finger *f);
 HF_SHARED void hf_lose_taxels(
     const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid);

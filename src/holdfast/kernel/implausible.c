@@ -196,7 +196,7 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
 }
 
 /* Find the magnetometers that read zeros, or jump alone, at this sample. Return whether there are
- * any; only then `jumps` is filled. */
+ * any. `jumps` is empty before. */
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps)
 {
     holdfast_finger_memory *const s = f->state;
@@ -210,7 +210,6 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     }
     const holdfast_taxel_set before = s->jumped;
     hf_clear(&s->jumped);
-    hf_clear(jumps);
     /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
     hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;

@@ -23,10 +23,11 @@
 
 /* Let taxels that are at a limit now, and were not left out before, count for their last reading.
  * The difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
-HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit)
+HF_SHARED void hf_note_saturated(const hf_finger *f)
 {
+    const holdfast_taxel_set at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (!hf_has(at_limit, i) || hf_has(&f->state->masked, i)) {
+        if (!hf_has(&at_limit, i) || hf_has(&f->state->masked, i)) {
             continue;
         }
         for (size_t axis = 0; axis < 3; ++axis) {

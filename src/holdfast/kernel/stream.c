@@ -178,7 +178,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
-    holdfast_taxel_set jumps;
+    holdfast_taxel_set jumps = {{0}};
     /* After a gap the last sample is too old to show a jump. */
     const bool has_jumps = !after_gap && hf_find_jumps(f, &scan, &jumps);
     if (has_jumps || !hf_are_valid(f, &scan)) {
@@ -199,12 +199,8 @@ static int32_t hf_process(const hf_finger *f, double time)
     /* Half a period of tolerance: the rounding of times moves no sample. */
     const hf_real elapsed = (hf_real)(time - s->first_time) + f->hand->period / 2;
     const bool is_saturated = scan.least <= low || scan.most >= high;
-    holdfast_taxel_set at_limit;
-    if (is_saturated) {
-        at_limit = hf_taxels_outside(f, low, high);
-        if (s->is_tared) {
-            hf_note_saturated(f, &at_limit);
-        }
+    if (is_saturated && s->is_tared) {
+        hf_note_saturated(f);
     }
     if (!hf_update_tare(f, elapsed)) {
         return HOLDFAST_TARE;
@@ -214,18 +210,14 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_unite(f, &v->taxels, &s->faulty_taxels);
     }
     if (is_saturated) {
+        const holdfast_taxel_set at_limit = hf_taxels_outside(f, low, high);
         v->faults |= HOLDFAST_SATURATED;
         hf_unite(f, &v->taxels, &at_limit);
     }
-    const bool has_left_out = v->faults || s->has_masked;
-    holdfast_taxel_set left_out;
-    if (has_left_out) {
-        left_out = v->taxels;
-        hf_unite(f, &left_out, &s->masked);
-    }
     /* Before the masks, which compare loads without the field. */
-    const uint32_t field = hf_take_out_field(f, has_left_out ? &left_out : NULL);
-    const bool enough = !(has_left_out || s->fading) || hf_mask_taxels(f, &v->taxels, time);
+    const uint32_t field = hf_take_out_field(f);
+    const bool has_mask = v->faults || s->has_masked || s->fading;
+    const bool enough = !has_mask || hf_mask_taxels(f, &v->taxels, time);
     return hf_process_force(f, enough, field, time);
 }
 
