@@ -105,7 +105,7 @@ int main(void)
     if (!block) {
         return 1;
     }
-    holdfast_detector_place(&hf_model, &d, block);
+    holdfast_detector_use_memory(&hf_model, &d, block);
 #endif
     for (int i = 0; i < 2; ++i) { /* the second time after a reset */
         holdfast_start(&hf_model, &d, NULL);

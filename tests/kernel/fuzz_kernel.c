@@ -224,7 +224,7 @@ static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
     void *const block = fits && size <= MAX_MEMORY ? malloc(size) : NULL;
     if (block) {
         holdfast_detector_memory d;
-        holdfast_detector_place(&model, &d, block);
+        holdfast_detector_use_memory(&model, &d, block);
         holdfast_start(&model, &d, take(in, 1) % 2 ? readings : NULL);
         process(in, &model, &d, readings, n_taxels);
     }
@@ -272,7 +272,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     holdfast_lag *const lags = (holdfast_lag *)calloc(hand.n_lags, sizeof *lags);
     hf_real *const used = (hf_real *)calloc(hand.n_lanes, sizeof(hf_real));
     hf_real *const rotations = (hf_real *)calloc(hand.n_lanes, 9 * sizeof(hf_real));
-    hf_real *const places = (hf_real *)calloc(hand.n_lanes, 3 * sizeof(hf_real));
+    hf_real *const positions = (hf_real *)calloc(hand.n_lanes, 3 * sizeof(hf_real));
     for (size_t i = 0; i < n_made && i < hand.n_fingers; ++i) {
         f[i] = fingers[i];
         for (size_t j = f[i].first; j < f[i].first + f[i].n_taxels && j < hand.n_lanes; ++j) {
@@ -283,7 +283,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         rotations[i] = (hf_real)(i % 4) / 4;
     }
     for (size_t i = 0; i < 3 * hand.n_lanes; ++i) {
-        places[i] = (hf_real)(i % 5) - 2;
+        positions[i] = (hf_real)(i % 5) - 2;
     }
     for (size_t i = 0; i < hand.n_lags; ++i) {
         lags[i].samples = (size_t)take(&in, 1) % 40;
@@ -326,7 +326,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     hand.lags = lags;
     hand.used = used;
     hand.rotations = rotations;
-    hand.places = places;
+    hand.positions = positions;
     if (!holdfast_check(&hand)) {
         n_taxels = 0;
         for (size_t i = 0; i < hand.n_fingers; ++i) {
@@ -339,6 +339,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     free(lags);
     free(used);
     free(rotations);
-    free(places);
+    free(positions);
     return 0;
 }

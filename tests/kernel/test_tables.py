@@ -90,8 +90,8 @@ class TestCheck:
             ("used.3", 0.5, "used"),
             ("used.3", np.nan, "used"),
             ("used.3", 0.0, "n_used of a finger"),
-            ("rotations.5", np.inf, "a rotation or a place of a taxel"),
-            ("places.5", np.nan, "a rotation or a place of a taxel"),
+            ("rotations.5", np.inf, "a rotation or a position of a taxel"),
+            ("positions.5", np.nan, "a rotation or a position of a taxel"),
         ],
     )
     def test_what_does_not_fit_is_named(self, plan, field, value, wrong):
@@ -107,9 +107,9 @@ class TestCheck:
             {"one": HOLDFAST_FEATURES, "two": HOLDFAST_FEATURES[:1]},
             14, Tare.parse("first"), 100,
         )  # fmt: skip
-        place = len(HOLDFAST_FEATURES) + 1
-        assert stream_config(plan).features[place]["kind"] == -1
-        assert refused(plan, f"features.{place}.of_hand", True) == "of_hand of a padding"
+        index = len(HOLDFAST_FEATURES) + 1
+        assert stream_config(plan).features[index]["kind"] == -1
+        assert refused(plan, f"features.{index}.of_hand", True) == "of_hand of a padding"
 
     def test_a_set_holds_512_taxels(self):
         plan = StreamPlan({"f": made(512)}, {"f": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
@@ -118,7 +118,7 @@ class TestCheck:
         config.hand["n_lanes"] = 516
         config.fingers["n_taxels"], config.fingers["n_used"] = 513, 513.0
         used = (np.arange(516) < 513).astype(float)
-        wide = config._replace(used=used, rotations=np.zeros(9 * 516), places=np.zeros(3 * 516))
+        wide = config._replace(used=used, rotations=np.zeros(9 * 516), positions=np.zeros(3 * 516))
         with pytest.raises(ValueError, match="first, first_taxel or n_taxels of a finger"):
             _extension.Stream(*packed(wide), bytes(513 * 24))
 

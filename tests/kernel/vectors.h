@@ -64,7 +64,7 @@ static const hf_real hf_rotations[108] = {
 (hf_real)0.9229055355994896, (hf_real)-0.47875234935934197, (hf_real)0.8954756376710904, (hf_real)0.48502554529552716,
 (hf_real)-0.008093396955073, (hf_real)-0.7041521496616935, (hf_real)-0.15970386888294777, (hf_real)0.18920194319713662,
 (hf_real)0.38494138422043783, (hf_real)0.5243719463412652, (hf_real)0.4154732922840792, (hf_real)0.8537873535612975};
-static const hf_real hf_places[36] = {
+static const hf_real hf_positions[36] = {
 (hf_real)-0.3072445726414318, (hf_real)0.8580741180625286, (hf_real)-0.7999071792868789, (hf_real)-0.8439974011009677,
 (hf_real)0.24907763386578208, (hf_real)0.0, (hf_real)0.0, (hf_real)0.0, (hf_real)0.5849198280369409, (hf_real)0.5061964928490801, (hf_real)-0.2206593585289832,
 (hf_real)-0.0005596610126927205, (hf_real)-0.8704569623570378, (hf_real)0.0, (hf_real)0.0, (hf_real)0.0, (hf_real)0.7613366918128979,
@@ -195,7 +195,7 @@ static const hf_real hf_weights[504] = {
 (hf_real)-0.4042023832180394, (hf_real)1.08965067339094, (hf_real)-0.22777408708041053};
 static const holdfast_hand hf_hand =
 
-{2, 12, 26, 1, 14, 4, 3, 13, (hf_real)0.03333333333333333, 0, (hf_real)0.5, (hf_real)0.5, (hf_real)0.8111243971624382, false, true, true, hf_fingers, hf_features, hf_lags, hf_used, hf_rotations, hf_places};
+{2, 12, 26, 1, 14, 4, 3, 13, (hf_real)0.03333333333333333, 0, (hf_real)0.5, (hf_real)0.5, (hf_real)0.8111243971624382, false, true, true, hf_fingers, hf_features, hf_lags, hf_used, hf_rotations, hf_positions};
 static const holdfast_rule hf_rules[2] = {
 
 {{{1, 26, 0, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 26, 27, true, (hf_real)0.5, (hf_real)0.8111243971624382, (hf_real)0.05, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 26, 132, true, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)3.0, {0, 0, 0, 0, 0, 0}}, {3, 26, 237, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {1, 2, 6, 0, 0, 0}}}, 3, (hf_real)3.0},

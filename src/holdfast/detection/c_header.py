@@ -69,7 +69,7 @@ class Tables:
         no_lag = np.zeros(1, stream.lags.dtype)  # C has no empty arrays
         self._add("holdfast_lag", "lags", stream.lags if len(stream.lags) else no_lag)
         for name, values in (
-            ("used", stream.used), ("rotations", stream.rotations), ("places", stream.places),
+            ("used", stream.used), ("rotations", stream.rotations), ("positions", stream.positions),
             ("weights", detector.weights), *[("baseline", baseline)] * self.has_baseline,
         ):  # fmt: skip
             self._add("hf_real", name, values.ravel())
@@ -233,13 +233,13 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     # Names that are the same in capitals, or without signs, give way to numbers.
     names = [re.sub(r"\W", "_", name, flags=re.ASCII).upper() for name in sensors]
     if len(set(names)) < len(names):
-        names = [f"{place}" for place in range(len(names))]
+        names = [f"{index}" for index in range(len(names))]
     # Reasons are codes, faults are bits of a mask, as `Detector` has them.
     for prefix, members in (
-        ("FINGER", [(name, place) for place, name in enumerate(names)]),
+        ("FINGER", [(name, index) for index, name in enumerate(names)]),
         ("FIRST_TAXEL", list(zip(names, first, strict=False))),
-        ("REASON", [(reason.name, place) for place, reason in enumerate(Reason)]),
-        ("FAULT", [(fault.name, 1 << place) for place, fault in enumerate(Fault)]),
+        ("REASON", [(reason.name, index) for index, reason in enumerate(Reason)]),
+        ("FAULT", [(fault.name, 1 << index) for index, fault in enumerate(Fault)]),
         ("CAUSE", [("NONE", 0)]),
     ):
         lines = (f"    HOLDFAST_{prefix}_{name} = {value}" for name, value in members)

@@ -57,7 +57,7 @@ class StreamConfig(NamedTuple):
         lags: (n_lags,) of `holdfast_lag`.
         used: (n_lanes,) 1 for each taxel that contributes, else 0.
         rotations: (9 n_lanes,) from the taxel frames to the fingertip frame.
-        places: (3 n_lanes,) of the taxels about their centroid, in radii of the patch.
+        positions: (3 n_lanes,) of the taxels about their centroid, in radii of the patch.
     """
 
     hand: Structs
@@ -66,7 +66,7 @@ class StreamConfig(NamedTuple):
     lags: Structs
     used: Array
     rotations: Array
-    places: Array
+    positions: Array
 
 
 class ModelConfig(NamedTuple):
@@ -118,7 +118,7 @@ def stream_config(plan: StreamPlan) -> StreamConfig:
             # A rotation of 0 takes an ignored taxel out of all sums without a branch.
             [_in_lanes(np.where(u[:, None, None], s.rotations, 0), n) for s, u, n in taxels]
         ),
-        np.concatenate([_in_lanes(_places(s, u), n) for s, u, n in taxels]),
+        np.concatenate([_in_lanes(_positions(s, u), n) for s, u, n in taxels]),
     )  # fmt: skip
 
 
@@ -224,13 +224,13 @@ def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
     }
 
 
-def _places(sensor: Sensor, used: Flags) -> Array:
-    """Return the taxels' places about their centroid, in root mean square distances from it."""
+def _positions(sensor: Sensor, used: Flags) -> Array:
+    """Return the taxels' positions about their centroid, in root mean square distances from it."""
     if not used.any():
         return np.zeros_like(sensor.positions)
-    places = sensor.positions - sensor.positions[used].mean(axis=0)
-    radius = float(np.sqrt((places[used] ** 2).sum(axis=1).mean()))
-    return places / radius if radius > 0 else np.zeros_like(places)
+    positions = sensor.positions - sensor.positions[used].mean(axis=0)
+    radius = float(np.sqrt((positions[used] ** 2).sum(axis=1).mean()))
+    return positions / radius if radius > 0 else np.zeros_like(positions)
 
 
 def _in_lanes(values: Array, n_lanes: int) -> Array:

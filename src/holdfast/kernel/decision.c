@@ -140,9 +140,8 @@ HF_SHARED void hf_decide(
     d->probability = 0;
     /* By the load, the probability stays that of the features, also without contact. */
     if (by_load || !unloaded) {
-        const holdfast_head *const stable = &heads[HOLDFAST_HEAD_STABLE];
-        d->probability = hf_probability(
-            stable->n_features > 0 ? hf_head_value(stable, model->weights, phi) : d->given);
+        d->probability =
+            hf_probability(hf_head_value(&heads[HOLDFAST_HEAD_STABLE], model->weights, phi));
     }
     if (unloaded) {
         d->filtered = HF_NAN;

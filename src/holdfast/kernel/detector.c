@@ -190,10 +190,10 @@ HF_API size_t holdfast_detector_size(const holdfast_model *model)
     return holdfast_memory_size(model->hand) + model->hand->n_fingers * sizeof(holdfast_decision);
 }
 
-HF_API void holdfast_detector_place(
+HF_API void holdfast_detector_use_memory(
     const holdfast_model *model, holdfast_detector_memory *d, void *block)
 {
-    holdfast_place(model->hand, &d->memory, block);
+    holdfast_use_memory(model->hand, &d->memory, block);
     d->decisions =
         (holdfast_decision *)((unsigned char *)block + holdfast_memory_size(model->hand));
 }

@@ -19,7 +19,7 @@
  *   1. Tables (`holdfast_model`) are constants: those of the kernel, and heads and limits of each
  *      finger. `holdfast_check_model` refuses those that do not fit, once.
  *   2. Memory (`holdfast_detector_memory`): the caller's, `holdfast_detector_size` bytes given to
- *      `holdfast_detector_place`; with sizes as macros the struct holds all of it.
+ *      `holdfast_detector_use_memory`; with sizes as macros the struct holds all of it.
  *   3. `holdfast_start` sets the memory to that before the first sample. Call it again to reset.
  *   4. `holdfast_detect` processes a sample and fills an estimate of the caller.
  *   In an exported header, `holdfast_init` and `holdfast_update` do 3 and 4 with its tables.
@@ -74,7 +74,7 @@ enum {
  * squares (3, n_features) mean, 1 / scale and q. */
 typedef struct {
     size_t n_outputs;  /* 0: the model has no such head */
-    size_t n_features; /* up to the last one that it uses; 0 if z is given from outside */
+    size_t n_features; /* up to the last one that it uses */
     size_t first;      /* its first number in `weights` */
     bool has_squares;
     hf_real threshold; /* of the probability */
@@ -109,7 +109,7 @@ typedef struct {
 /* What is remembered of the decisions about a finger. Times are NaN where there was none.
  *
  * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at and loaded_at;
- * heads.c scores and all about slips; the caller given; decision.c the rest. */
+ * heads.c scores and all about slips; decision.c the rest. */
 typedef struct {
     int32_t state;            /* that is reported */
     int32_t candidate;        /* of the last sample; may not have lasted long enough yet */
@@ -128,7 +128,6 @@ typedef struct {
     double loaded_at;         /* when the load was last that of a contact [s] */
     hf_real filtered;         /* log odds by the forward filter; NaN before its first sample */
     double filtered_at;       /* time of that sample [s] */
-    hf_real given;            /* z of the head `stable`, if it is given from outside */
     hf_real slip_log_odds;    /* smoothed; NaN before its first sample */
     hf_real slip_probability; /* NaN without an estimate */
     double last_slip;         /* last sample over the threshold [s] */
@@ -179,8 +178,8 @@ HF_API const char *holdfast_check_model(const holdfast_model *model);
 /* Return the size of the memory of a detector, beside its struct [bytes]. */
 HF_API size_t holdfast_detector_size(const holdfast_model *model);
 
-/* Place the arrays of a detector into a block of that size, aligned as for double. */
-HF_API void holdfast_detector_place(
+/* Set the arrays of a detector to parts of a block of that size, aligned as for double. */
+HF_API void holdfast_detector_use_memory(
     const holdfast_model *model, holdfast_detector_memory *d, void *block);
 #endif
 

@@ -245,7 +245,7 @@ static bool hf_are_lively(const hf_finger *f, size_t i, hf_vectors now, hf_vecto
     return are_lively && hf_are_positive(hf_smaller(squares, hf_smaller(has, had)));
 }
 
-/* As `hf_update_taxel`, for taxels in the usual case. */
+/* Update the past of taxels in the usual case, as `hf_update_taxel` does. */
 static void hf_update_lively(
     const hf_finger *f, size_t i, hf_vectors now, hf_vectors then, hf_real share)
 {

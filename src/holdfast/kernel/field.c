@@ -54,8 +54,8 @@ typedef struct {
     hf_real differences; /* sum of the squared distances of the taxels from the mean */
 } hf_common;
 
-/* Return what the taxels that are not left out have in common. */
-static hf_common hf_find_common(const hf_finger *f, const holdfast_taxel_set *left_out)
+/* Return what the taxels have in common that are neither faulty nor masked. */
+static hf_common hf_find_common(const hf_finger *f)
 {
     /* h_i = f_i - b_i: sum h_i, sum R_i h_i, sum |h_i|^2. */
     const size_t n = f->n;
@@ -87,8 +87,10 @@ static hf_common hf_find_common(const hf_finger *f, const holdfast_taxel_set *le
         sums[k] = hf_total(parts[k]);
     }
     hf_common common = {f->finger->n_used, {0, 0, 0, 0, 0, 0}, false, 0};
-    for (size_t i = 0; left_out && i < f->n_taxels; ++i) {
-        if (hf_has(left_out, i) && f->used[i] > 0) {
+    const holdfast_taxel_set *const faulty = &f->values->taxels, *const masked = &f->state->masked;
+    const bool has_left_out = f->values->faults || f->state->has_masked;
+    for (size_t i = 0; has_left_out && i < f->n_taxels; ++i) {
+        if ((hf_has(faulty, i) || hf_has(masked, i)) && f->used[i] > 0) {
             hf_real h[3];
             for (size_t axis = 0; axis < 3; ++axis) {
                 h[axis] = f->readings[axis * n + i] - f->baseline[axis * n + i];
@@ -270,10 +272,8 @@ static bool hf_update_field(const hf_finger *f, const hf_common *common)
     return false;
 }
 
-/* Take the field out of the readings of a finger. Return its faults.
- *
- * left_out: the taxels that do not count; NULL for none. */
-HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out)
+/* Take the field out of the readings of a finger. Return its faults. */
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f)
 {
     holdfast_finger_memory *const s = f->state;
     if (!(f->finger->max_field > 0) || isnan(s->noise)) {
@@ -284,7 +284,7 @@ HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_se
     if (s->is_deep && s->n_skipped < HF_SKIPPED_SAMPLES && !hf_another_turns(f, 0, HF_INFINITY)) {
         s->n_skipped += 1;
     } else {
-        const hf_common common = hf_find_common(f, left_out);
+        const hf_common common = hf_find_common(f);
         /* Counted, because a touch that begins is unclear, too, but not for long. */
         s->n_unclear = hf_update_field(f, &common) ? s->n_unclear + 1 : 0;
         s->n_skipped = 0;

@@ -44,7 +44,7 @@ typedef struct {
     size_t n;                 /* lanes: n_taxels rounded up */
     const hf_real *used;      /* (n) 1 for taxels that contribute, else 0 */
     const hf_real *rotations; /* (9, n) */
-    const hf_real *places;    /* (3, n) */
+    const hf_real *positions; /* (3, n) */
     hf_real *readings;        /* (3, n), as those that follow */
     hf_real *previous;
     hf_real *baseline;
@@ -69,10 +69,10 @@ static inline size_t hf_n_lanes(size_t n_taxels)
     return (n_taxels + HF_LANES - 1) / HF_LANES * HF_LANES;
 }
 
-/* Return the taxel forces of a finger (3, n) at a place of the ring. */
-static inline hf_real *hf_forces_at(const hf_finger *f, size_t place)
+/* Return the taxel forces of a finger (3, n) at an index of the ring. */
+static inline hf_real *hf_forces_at(const hf_finger *f, size_t index)
 {
-    return f->taxel_forces + place * 3 * HF_N_LANES(f->hand);
+    return f->taxel_forces + index * 3 * HF_N_LANES(f->hand);
 }
 
 /* Return the words of a set that a finger needs. */
@@ -190,7 +190,7 @@ typedef struct {
 
 /* Three samples of a second difference: a g(k) - 2 g(k-s) + c g(k-2s). */
 typedef struct {
-    size_t now; /* places in the ring */
+    size_t now; /* indices in the ring */
     size_t before;
     size_t first;
     hf_real newest; /* weight a; 1 at even times */
@@ -226,7 +226,7 @@ HF_SHARED hf_moments hf_newest_moments(const hf_finger *f, size_t channel, size_
 HF_SHARED hf_real hf_noise_sigma(hf_real noise, size_t window);
 HF_SHARED void hf_append_force(const hf_finger *f, const hf_real force[3]);
 
-/* The readings of a finger in short. */
+/* Summary of the readings of a finger. */
 typedef struct {
     hf_real total; /* weighted sum; finite if all readings are */
     hf_real least;
@@ -242,18 +242,18 @@ HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
 HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
 HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
 
-/* untrue.c */
+/* implausible.c */
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
-HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan);
+HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan);
 
 /* tare.c */
 HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
 
 /* field.c */
-HF_SHARED uint32_t hf_take_out_field(const hf_finger *f, const holdfast_taxel_set *left_out);
+HF_SHARED uint32_t hf_take_out_field(const hf_finger *f);
 
 /* masks.c */
-HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit);
+HF_SHARED void hf_note_saturated(const hf_finger *f);
 HF_SHARED void hf_hold_lost(const hf_finger *f);
 HF_SHARED void hf_lose_taxels(
     const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid);

@@ -12,7 +12,7 @@
 #include "window.c"
 
 #include "faults.c"
-#include "untrue.c"
+#include "implausible.c"
 #include "tare.c"
 #include "field.c"
 #include "masks.c"

@@ -4,7 +4,8 @@
  *   A hand is a few fingers (fingertips, pads). A finger has one sensor of n_taxels taxels, each of
  *   which reports a force in three axes. At a sample, each finger that is present goes through:
  *
- *     readings -> valid? (faults.c) -> true? (untrue.c) -> changes and faulty taxels (faults.c)
+ *     readings -> valid? (faults.c) -> plausible? (implausible.c)
+ *              -> changes and faulty taxels (faults.c)
  *              -> tare and noise (tare.c) -> magnetic field taken out (field.c)
  *              -> faulty taxels filled in (masks.c)
  *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c)
@@ -22,7 +23,7 @@
  *      model. `holdfast_check` refuses tables whose sizes or indices do not fit: once, before the
  *      first sample. No other function checks them again.
  *   2. Memory. With sizes as fields, the caller gives `holdfast_memory_size` bytes to
- *      `holdfast_place`. With sizes as macros (see below), `holdfast_memory` holds all of it.
+ *      `holdfast_use_memory`. With sizes as macros (see below), `holdfast_memory` holds all of it.
  *   3. `holdfast_begin` sets the memory to that before the first sample. Call it again to reset.
  *   4. `holdfast_advance` processes a sample. The result is in `memory->values` and
  *      `memory->features`, until the next sample.
@@ -188,7 +189,7 @@ enum {
 };
 
 enum {
-    HF_N_RING_SUMS = 128, /* kept sums of samples: two of the longest periods (untrue.c) */
+    HF_N_RING_SUMS = 128, /* kept sums of samples: two of the longest periods (implausible.c) */
     HF_N_SUMS = 3,        /* of a block of pairs: P, D and S (window.c) */
     HF_N_COMPONENTS = 4,  /* of the history: F_a, F_x, F_y, F_z */
     HF_MAX_FINGER_TAXELS = 64 * HOLDFAST_MASK_WORDS,
@@ -267,7 +268,7 @@ typedef struct {
                                          ones, and for lanes without a taxel */
     const hf_real *rotations;         /* (9 n_lanes) from taxel frame to fingertip frame: of each
                                          finger R_00 of all lanes, R_01, ...; 0 of ignored taxels */
-    const hf_real *places;            /* (3 n_lanes) from the centroid, in radii of the patch */
+    const hf_real *positions;         /* (3 n_lanes) from the centroid, in radii of the patch */
 } holdfast_hand;
 
 /* A set of taxels of a finger: bit i % 64 of word i / 64 is taxel i. Other bits are 0. */
@@ -296,7 +297,7 @@ typedef struct {
     bool unweighed;          /* it is left out, and its share of the load is not known */
 } holdfast_mask;
 
-/* A taxel in a ring of samples that may repeat (untrue.c). */
+/* A taxel in a ring of samples that may repeat (implausible.c). */
 typedef struct {
     hf_real anchor[3]; /* reading of the sample from which on the ring is followed */
     bool varies[3];    /* the reading differed from it in the period after it */
@@ -391,7 +392,7 @@ typedef struct {
     bool has_new_field;     /* the field changed at this sample */
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
-    /* Samples that cannot be true (untrue.c). */
+    /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
     uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
@@ -472,8 +473,8 @@ HF_API const char *holdfast_check(const holdfast_hand *hand);
 /* Return the size of the memory of a stream [bytes]. */
 HF_API size_t holdfast_memory_size(const holdfast_hand *hand);
 
-/* Place the arrays of a stream into a block of that size, aligned as for double. */
-HF_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block);
+/* Set the arrays of a stream to parts of a block of that size, aligned as for double. */
+HF_API void holdfast_use_memory(const holdfast_hand *hand, holdfast_memory *memory, void *block);
 #endif
 
 /* Set the memory to that before the first sample.

@@ -20,13 +20,13 @@
 
 #include "kernel.h"
 
-/* The second number if it is larger, else the first: NaN stays only if it is the first. */
+/* Return the second number if it is larger, else the first. NaN stays only if it is the first. */
 static inline hf_real hf_max(hf_real a, hf_real b)
 {
     return b > a ? b : a;
 }
 
-/* The second number if it is smaller, else the first; NaN as above. */
+/* Return the second number if it is smaller, else the first. NaN stays only if it is the first. */
 static inline hf_real hf_min(hf_real a, hf_real b)
 {
     return b < a ? b : a;

@@ -23,15 +23,16 @@
 
 /* Let taxels that are at a limit now, and were not left out before, count for their last reading.
  * The difference is in `fade`, which `hf_load_of` adds when the mask changes at this sample. */
-HF_SHARED void hf_note_saturated(const hf_finger *f, const holdfast_taxel_set *at_limit)
+HF_SHARED void hf_note_saturated(const hf_finger *f)
 {
+    const holdfast_taxel_set at_limit = hf_taxels_outside(f, f->finger->low, f->finger->high);
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        if (!hf_has(at_limit, i) || hf_has(&f->state->masked, i)) {
+        if (!hf_has(&at_limit, i) || hf_has(&f->state->masked, i)) {
             continue;
         }
         for (size_t axis = 0; axis < 3; ++axis) {
-            const size_t place = axis * f->n + i;
-            f->masks[i].fade[axis] += f->previous[place] - f->readings[place];
+            const size_t index = axis * f->n + i;
+            f->masks[i].fade[axis] += f->previous[index] - f->readings[index];
         }
     }
 }
@@ -77,9 +78,9 @@ static void hf_beyond_rest(const hf_finger *f, size_t i, hf_real beyond[3])
     const hf_real *const turn = f->rotations;
     const hf_real x = f->reference[i], y = f->reference[n + i], z = f->reference[2 * n + i];
     for (size_t axis = 0; axis < 3; ++axis) {
-        const size_t place = axis * n + i;
-        beyond[axis] = f->readings[place] - f->baseline[place] -
-                       (turn[place] * x + turn[3 * n + place] * y + turn[6 * n + place] * z);
+        const size_t index = axis * n + i;
+        beyond[axis] = f->readings[index] - f->baseline[index] -
+                       (turn[index] * x + turn[3 * n + index] * y + turn[6 * n + index] * z);
     }
 }
 

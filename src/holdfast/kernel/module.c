@@ -180,7 +180,7 @@ static int begin_stream(stream *s, PyObject *const *args, const char *noun)
         !(h->lags = from_bytes(args[3], "lags", h->n_lags, sizeof *h->lags)) ||
         !(h->used = from_bytes(args[4], "used", h->n_lanes, width)) ||
         !(h->rotations = from_bytes(args[5], "rotations", 9 * h->n_lanes, width)) ||
-        !(h->places = from_bytes(args[6], "places", 3 * h->n_lanes, width)) ||
+        !(h->positions = from_bytes(args[6], "positions", 3 * h->n_lanes, width)) ||
         refuse_config(holdfast_check(h)) < 0) {
         return -1;
     }
@@ -196,7 +196,7 @@ static int begin_stream(stream *s, PyObject *const *args, const char *noun)
     if (s->present == NULL) {
         return -1;
     }
-    holdfast_place(h, &s->memory, block);
+    holdfast_use_memory(h, &s->memory, block);
     holdfast_begin(h, &s->memory, baseline);
     s->last_time = -INFINITY;
     s->noun = noun;

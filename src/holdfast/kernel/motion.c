@@ -37,19 +37,19 @@
 /* Noise in the denominator of the ratio of forces: a light touch has no large ratio. */
 #define HF_NORMAL_NOISE_WEIGHT ((hf_real)10)
 
-/* Return the place in the ring that lies `back` samples, at most all, before another. */
-static inline size_t hf_place_before(const hf_finger *f, size_t now, size_t back)
+/* Return the index in the ring that lies `back` samples, at most all, before another. */
+static inline size_t hf_index_before(const hf_finger *f, size_t now, size_t back)
 {
     return now >= back ? now - back : now + HF_N_TRACK(f->hand) - back;
 }
 
-/* Return the time of the sample `back` samples before that at a place [s]. */
+/* Return the time of the sample `back` samples before that at an index [s]. */
 static inline double hf_time_before(const hf_finger *f, size_t now, size_t back)
 {
-    return f->track[hf_place_before(f, now, back)].time;
+    return f->track[hf_index_before(f, now, back)].time;
 }
 
-/* Compute the change of the fingertip force from one place of the ring to another. */
+/* Compute the change of the fingertip force from one index of the ring to another. */
 static void hf_force_between(const hf_finger *f, size_t then, size_t now, hf_real change[3])
 {
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -91,7 +91,7 @@ HF_SHARED hf_real hf_append_taxels(const hf_finger *f, double time, hf_real forc
     holdfast_motion *const m = &f->state->motion;
     const size_t length = HF_N_TRACK(f->hand);
     size_t now = (size_t)(m->n_samples % (int64_t)length);
-    const size_t before = hf_place_before(f, now, 1);
+    const size_t before = hf_index_before(f, now, 1);
     const hf_real elapsed = (hf_real)(time - f->track[before].time);
     const hf_real limit = HF_GAP_LIMIT_PERIODS * f->hand->period;
     if (m->n_samples > 0 && elapsed > hf_max(limit, HF_MAX_BRIDGED_SECONDS)) {
@@ -246,7 +246,7 @@ static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, 
         back = hf_samples_back(f, now, n_before, time - HF_MOVE_SECONDS, back);
     }
     hf_real change[3];
-    hf_force_between(f, hf_place_before(f, now, back), now, change);
+    hf_force_between(f, hf_index_before(f, now, back), now, change);
     m->moved_by = hf_sqrt(hf_square(change));
     if (m->moved_by > hf_max(HF_MOVED_TO_NOISE * m->noise, HF_RELEASED_SHARE * m->peak_load)) {
         m->moved_at = time;
@@ -350,8 +350,8 @@ static hf_second hf_second_of(const hf_finger *f, size_t now, size_t back, size_
         middle = hf_time_before(f, now, back);
     }
     const size_t further = hf_samples_back(f, now, n_before, 2 * middle - newest, 2 * back);
-    second.before = hf_place_before(f, now, back);
-    second.first = hf_place_before(f, now, further > back ? further : back + 1);
+    second.before = hf_index_before(f, now, back);
+    second.first = hf_index_before(f, now, further > back ? further : back + 1);
     /* h = t(k) - t(k-s), h' = t(k-s) - t(k-2s): a = 2 h' / (h + h'), c = 2 h / (h + h'). */
     const double later = newest - middle, earlier = middle - f->track[second.first].time;
     const double whole = later + earlier;
@@ -435,7 +435,7 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
         const holdfast_lag *const lag = &hand->lags[i];
         hf_real *const out = f->relative + i * HOLDFAST_N_RELATIVE;
         const size_t back = hf_samples_back(f, now, n_before, time - lag->seconds, lag->samples);
-        const size_t then = hf_place_before(f, now, back);
+        const size_t then = hf_index_before(f, now, back);
         if (lag->has_changes) {
             hf_fill_changes(f, now, then, load_to_noise, out);
         }

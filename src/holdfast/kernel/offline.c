@@ -1,6 +1,6 @@
 /* The detector, and its rules for whole arrays: probabilities, and states with other limits.
  *
- * The extension alone has the latter: exported headers join the files of holdfast.c. */
+ * Exported headers have no functions of whole arrays: they join the files of holdfast.c. */
 #include "holdfast.c"
 
 #include "batch.h"

@@ -1,4 +1,4 @@
-/* One sample of a hand, in the order of kernel.h: is it valid and true, changes, tare, field,
+/* One sample of a hand, in the order of kernel.h: is it valid and plausible, changes, tare, field,
  * masks, force and features. */
 #include "finger.h"
 
@@ -18,7 +18,7 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.n = hf_n_lanes(finger->n_taxels);
     f.used = hand->used + first;
     f.rotations = hand->rotations + 9 * first;
-    f.places = hand->places + 3 * first;
+    f.positions = hand->positions + 3 * first;
     f.readings = memory->readings + 3 * first;
     f.previous = memory->previous + 3 * first;
     f.baseline = memory->baseline + 3 * first;
@@ -178,7 +178,7 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
-    holdfast_taxel_set jumps;
+    holdfast_taxel_set jumps = {{0}};
     /* After a gap the last sample is too old to show a jump. */
     const bool has_jumps = !after_gap && hf_find_jumps(f, &scan, &jumps);
     if (has_jumps || !hf_are_valid(f, &scan)) {
@@ -188,23 +188,19 @@ static int32_t hf_process(const hf_finger *f, double time)
         }
         scan = hf_scan_readings(f, f->readings);
     }
-    /* Before the sample is counted: one that cannot be true reaches no tare, force or window. */
-    const uint32_t untrue = hf_find_untrue(f, &scan);
-    if (untrue) {
+    /* Before the sample is counted: an implausible one reaches no tare, force or window. */
+    const uint32_t implausible = hf_find_implausible(f, &scan);
+    if (implausible) {
         s->n_stretch = 0;
-        v->faults |= untrue;
+        v->faults |= implausible;
         return HOLDFAST_FAULT;
     }
     hf_track_changes(f, time, after_gap);
     /* Half a period of tolerance: the rounding of times moves no sample. */
     const hf_real elapsed = (hf_real)(time - s->first_time) + f->hand->period / 2;
     const bool is_saturated = scan.least <= low || scan.most >= high;
-    holdfast_taxel_set at_limit;
-    if (is_saturated) {
-        at_limit = hf_taxels_outside(f, low, high);
-        if (s->is_tared) {
-            hf_note_saturated(f, &at_limit);
-        }
+    if (is_saturated && s->is_tared) {
+        hf_note_saturated(f);
     }
     if (!hf_update_tare(f, elapsed)) {
         return HOLDFAST_TARE;
@@ -214,18 +210,14 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_unite(f, &v->taxels, &s->faulty_taxels);
     }
     if (is_saturated) {
+        const holdfast_taxel_set at_limit = hf_taxels_outside(f, low, high);
         v->faults |= HOLDFAST_SATURATED;
         hf_unite(f, &v->taxels, &at_limit);
     }
-    const bool has_left_out = v->faults || s->has_masked;
-    holdfast_taxel_set left_out;
-    if (has_left_out) {
-        left_out = v->taxels;
-        hf_unite(f, &left_out, &s->masked);
-    }
     /* Before the masks, which compare loads without the field. */
-    const uint32_t field = hf_take_out_field(f, has_left_out ? &left_out : NULL);
-    const bool enough = !(has_left_out || s->fading) || hf_mask_taxels(f, &v->taxels, time);
+    const uint32_t field = hf_take_out_field(f);
+    const bool has_mask = v->faults || s->has_masked || s->fading;
+    const bool enough = !has_mask || hf_mask_taxels(f, &v->taxels, time);
     return hf_process_force(f, enough, field, time);
 }
 

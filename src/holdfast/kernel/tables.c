@@ -73,8 +73,8 @@ static const char *hf_check_numbers(const holdfast_hand *hand)
         }
     }
     if (!hf_are_finite(hand->rotations, 9 * hand->n_lanes) ||
-        !hf_are_finite(hand->places, 3 * hand->n_lanes)) {
-        return "a rotation or a place of a taxel";
+        !hf_are_finite(hand->positions, 3 * hand->n_lanes)) {
+        return "a rotation or a position of a taxel";
     }
     return NULL;
 }
@@ -145,16 +145,17 @@ static const char *hf_check_feature(
 }
 
 #ifndef HOLDFAST_N_FINGERS
-/* Take n elements of a block for an array; NULL without a block. Arrays begin at cache lines. */
+/* Take n elements of a block for an array; NULL without a block. Arrays begin at multiples of 16
+ * bytes, as blocks of malloc do: then no vector of lanes.h lies in two cache lines. */
 static void *hf_take(void *block, uint64_t *used, uint64_t n, size_t size)
 {
     void *const array = block ? (unsigned char *)block + (size_t)*used : NULL;
-    *used += (n * size + 63) / 64 * 64;
+    *used += (n * size + 15) / 16 * 16;
     return array;
 }
 
-/* Place the arrays of a stream into a block, if it is one. Return its size [bytes]. */
-static uint64_t hf_place(const holdfast_hand *hand, holdfast_memory *m, void *block)
+/* Set the arrays of a stream to parts of a block, if it is one. Return its size [bytes]. */
+static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *block)
 {
     const uint64_t fingers = hand->n_fingers, lanes = hand->n_lanes, features = hand->n_features;
     const uint64_t rows = fingers * hand->n_history, samples = hand->n_track;
@@ -191,12 +192,12 @@ static uint64_t hf_place(const holdfast_hand *hand, holdfast_memory *m, void *bl
 HF_API size_t holdfast_memory_size(const holdfast_hand *hand)
 {
     holdfast_memory memory;
-    return (size_t)hf_place(hand, &memory, NULL);
+    return (size_t)hf_lay_out(hand, &memory, NULL);
 }
 
-HF_API void holdfast_place(const holdfast_hand *hand, holdfast_memory *memory, void *block)
+HF_API void holdfast_use_memory(const holdfast_hand *hand, holdfast_memory *memory, void *block)
 {
-    hf_place(hand, memory, block);
+    hf_lay_out(hand, memory, block);
 }
 #endif
 
@@ -221,7 +222,7 @@ HF_API const char *holdfast_check(const holdfast_hand *hand)
     }
 #ifndef HOLDFAST_N_FINGERS
     holdfast_memory memory;
-    if (!wrong && hf_place(hand, &memory, NULL) > SIZE_MAX / 2) {
+    if (!wrong && hf_lay_out(hand, &memory, NULL) > SIZE_MAX / 2) {
         wrong = "the sizes: more memory than there can be";
     }
 #endif

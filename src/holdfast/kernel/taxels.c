@@ -44,9 +44,9 @@ HF_SHARED hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_
     return hf_total(normal);
 }
 
-/* Store the taxel forces of a sample at place `now` of the ring, and return sums over the taxels.
+/* Store the taxel forces of a sample at index `now` of the ring, and return sums over the taxels.
  *
- * `before` is the place of the sample before, or any other place without one: `moved` means
+ * `before` is the index of the sample before, or any other index without one: `moved` means
  * nothing then. */
 HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t before)
 {
@@ -97,7 +97,7 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
     return sums;
 }
 
-/* Compute sum p_i r_i at a place of the ring, and return the moment about the normal,
+/* Compute sum p_i r_i at an index of the ring, and return the moment about the normal,
  * n . sum r_i x g_i. */
 HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
 {
@@ -107,7 +107,8 @@ HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide x = {0}, y = {0}, z = {0}, m = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
-            const hf_vectors g = hf_load_vectors(ring, n, i), r = hf_load_vectors(f->places, n, i);
+            const hf_vectors g = hf_load_vectors(ring, n, i);
+            const hf_vectors r = hf_load_vectors(f->positions, n, i);
             const hf_vectors product = {
                 r.y * g.z - r.z * g.y, r.z * g.x - r.x * g.z, r.x * g.y - r.y * g.x};
             const hf_wide p = hf_load(f->pressed + i);
@@ -127,7 +128,7 @@ HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3])
     return hf_total(moment);
 }
 
-/* Return the motion of the taxels from one place of the ring to another, against `mean`. */
+/* Return the motion of the taxels from one index of the ring to another, against `mean`. */
 HF_SHARED hf_residual
 hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3])
 {
@@ -198,7 +199,7 @@ HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
     return sums;
 }
 
-/* Return the sum of max(g_i . n, 0) over the taxels at a place of the ring. */
+/* Return the sum of max(g_i . n, 0) over the taxels at an index of the ring. */
 HF_SHARED hf_real hf_risen(const hf_finger *f, size_t now)
 {
     const size_t n = f->n;

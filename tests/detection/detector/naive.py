@@ -247,8 +247,8 @@ class Finger:
                     self.mask.unweighed |= masked
             if not enough:
                 return self.refuse(faults, invalid)
-        if untrue := self.untrue(readings):
-            return self.refuse(faults | untrue, invalid)
+        if implausible := self.implausible(readings):
+            return self.refuse(faults | implausible, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)
         if self.samples:
             changed = (self.samples[-1][1] != readings).any()
@@ -381,7 +381,7 @@ class Finger:
         self.field_speed = speed if turning and not self.is_shared else 0.0
         return False
 
-    def untrue(self, readings):
+    def implausible(self, readings):
         """Faults of a finger whose readings are valid and cannot be true."""
         low, high = self.sensor.range or (-math.inf, math.inf)
         used, size, faults = readings[self.used], high - low, set()

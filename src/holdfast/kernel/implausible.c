@@ -1,7 +1,7 @@
-/* Readings that are valid but cannot be true: of a whole finger, or of a taxel at one sample.
+/* Readings that are valid but implausible: of a whole finger, or of a taxel at one sample.
  *
  * They are judged by the readings alone, whatever the tare, and refused: they reach no tare, force
- * or window. Each rule costs a few comparisons at a sample that is true. */
+ * or window. Each rule costs a few comparisons at a plausible sample. */
 #include "finger.h"
 
 /* No sensor sends readings that are all smaller than this but not all zero. It is a number of
@@ -11,7 +11,7 @@
 /* A magnetometer that reads zero in all axes was read too early if it jumps there by this many
  * times as far as the other taxels move at this sample. */
 #define HF_ZERO_TO_STEPS ((hf_real)20)
-/* One taxel alone that jumps by this many times its noise is not true before it stays there for a
+/* A jump of one taxel alone by this many times its noise is implausible until it stays there for a
  * second sample: a touch spreads over the skin. */
 #define HF_JUMP_TO_NOISE ((hf_real)50)
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
@@ -196,7 +196,7 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
 }
 
 /* Find the magnetometers that read zeros, or jump alone, at this sample. Return whether there are
- * any; only then `jumps` is filled. */
+ * any. `jumps` is empty before. */
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps)
 {
     holdfast_finger_memory *const s = f->state;
@@ -210,7 +210,6 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     }
     const holdfast_taxel_set before = s->jumped;
     hf_clear(&s->jumped);
-    hf_clear(jumps);
     /* Steps of noise: two samples in three axes. Before it is known, those of the others. */
     const size_t n = f->n;
     hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
@@ -250,7 +249,7 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
                 step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
             }
             if (!hf_has(jumps, i) && !hf_has(&before, i) && hf_square(step) > quiet) {
-                hf_include(&s->jumped, i); /* at its second sample, a jump is true */
+                hf_include(&s->jumped, i); /* at its second sample, a jump is plausible */
             }
         }
     }
@@ -258,8 +257,8 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     return !hf_is_empty(f, jumps);
 }
 
-/* Return the faults of a finger whose readings, all valid, cannot be true; 0 without any. */
-HF_SHARED uint32_t hf_find_untrue(const hf_finger *f, const hf_scan *scan)
+/* Return the faults of a finger whose readings, all valid, are implausible; 0 without any. */
+HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
     uint32_t faults = hf_follow_ring(f, scan->total) ? HOLDFAST_REPEATED : 0;
