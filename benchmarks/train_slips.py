@@ -191,7 +191,7 @@ def print_folder(
     folder: str,
     recordings: Sequence[Recording],
     curves: Sequence[Mapping[str, SlipCurve]],
-    index: int,
+    place: int,
 ) -> None:
     """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
     own = [
@@ -200,7 +200,7 @@ def print_folder(
         if fingers and item.name.startswith(f"{folder}/")
     ]
     print(folder)
-    print_metrics(slip_metrics(SlipCurve.total(own)[index]))
+    print_metrics(slip_metrics(SlipCurve.total(own)[place]))
 
 
 def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCurve]:
