@@ -195,7 +195,7 @@ def test_add_a_feature(copy_of, tmp_path):
          '        # The change of F_tip, and its'),
     )  # fmt: skip
     copy.change(
-        "holdfast/kernel/kernel.h",
+        "holdfast/kernel/holdfast.h",
         ("HOLDFAST_FIRST_RELATIVE = 8,", "HOLDFAST_SHEAR = 8, HOLDFAST_FIRST_RELATIVE = 9,"),
     )
     copy.change("holdfast/kernel/stream.c", (HISTORY, HISTORY + SHEAR))

@@ -12,7 +12,7 @@
 #define HOLDFAST_MASK_WORDS 1
 #endif
 #ifdef HOLDFAST_VECTORS_LINKED
-#include "detector.h"
+#include "holdfast.h"
 #else
 #include "holdfast.c"
 #endif

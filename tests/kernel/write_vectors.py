@@ -147,7 +147,7 @@ def main():
         "/* Written by write_vectors.py; do not edit. */\n",
         "#ifdef HOLDFAST_VECTORS_FIXED\n",
         *(f"#define HOLDFAST_{name.upper()} {n}\n" for name, n in made.sizes.items()),
-        '#endif\n#ifdef HOLDFAST_VECTORS_LINKED\n#include "detector.h"\n',
+        '#endif\n#ifdef HOLDFAST_VECTORS_LINKED\n#include "holdfast.h"\n',
         '#else\n#include "holdfast.c"\n#endif\n\n',
         re.sub(r"-?\d+\.\d+(e[+-]?\d+)?", r"(hf_real)\g<0>", "\n".join(made.texts)),
         f"\n\nenum {{ N_SAMPLES = {N_SAMPLES}, EVERY = {EVERY} }};\n",

@@ -1,7 +1,7 @@
 """The detector: from samples of a hand to estimates. No I/O, no clock, no growth of memory.
 
 Offline detection is the same detector, fed with a recording. The C kernel does all that happens at
-a sample, see `kernel/detector.h`.
+a sample, see `kernel/holdfast.h`.
 """
 
 from collections import deque

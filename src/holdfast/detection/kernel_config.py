@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from holdfast.detection.model import FingerModel, Model
 
 Row = dict[str, Any]
-"""Values of a struct, by the names of its fields in `kernel/kernel.h` or `kernel/detector.h`."""
+"""Values of a struct, by the names of its fields in `kernel/holdfast.h`."""
 
 TARE_KINDS = ("seconds", "first", "none", "interval")
 """Kinds of tare. The code of a kind is its position."""

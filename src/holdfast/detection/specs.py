@@ -91,7 +91,7 @@ KINDS = {
         _over_lag("ratio_gain", "ratio"),
     )
 }
-"""All kinds by name. The order is that of the numbers in `kernel/kernel.h`: the code of a kind is
+"""All kinds by name. The order is that of the numbers in `kernel/holdfast.h`: the code of a kind is
 its position, so a new one of a family stands at the end of that family in both."""
 RELATIVE_KINDS = tuple(kind.name for kind in KINDS.values() if kind.window == "lag")
 TRANSFORMS = ("none", "log", "noise", "relative")

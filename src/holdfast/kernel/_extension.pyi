@@ -60,7 +60,7 @@ def replay(
     """Fill (n,) states of a finger from its probability of stability; see `training.replay`."""
 
 class Stream:
-    """The feature stream of a hand; see `kernel.h`. It cannot be copied or pickled.
+    """The feature stream of a hand; see `holdfast.h`. It cannot be copied or pickled.
 
     A call while another thread is inside one raises RuntimeError.
     """
@@ -87,7 +87,7 @@ class Estimates:
     def __iter__(self) -> Iterator[str]: ...
 
 class Detector:
-    """The detector of a hand; see `detector.h`. It cannot be copied or pickled.
+    """The detector of a hand; see `holdfast.h`. It cannot be copied or pickled.
 
     A call while another thread is inside one raises RuntimeError.
     """

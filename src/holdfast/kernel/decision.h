@@ -3,7 +3,7 @@
 #ifndef HF_DECISION_H
 #define HF_DECISION_H
 
-#include "detector.h"
+#include "holdfast.h"
 
 #include "finger.h"
 

@@ -2,7 +2,7 @@
 #ifndef HF_FINGER_H
 #define HF_FINGER_H
 
-#include "kernel.h"
+#include "holdfast.h"
 #include "lanes.h"
 
 #define HF_SQRT_2 ((hf_real)1.4142135623730951)

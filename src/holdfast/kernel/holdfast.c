@@ -1,11 +1,24 @@
-/* The kernel and the detector as one source file; see kernel.c. */
+/* The kernel and the detector as one source file: their functions are static, and compilers see all
+ * of them. An exported header joins the same files in this order. */
 #ifndef HF_SHARED
 #define HF_SHARED static
 #endif
 
-#include "detector.h"
+#include "holdfast.h"
 
-#include "kernel.c"
+#include "finger.h"
+
+#include "taxels.c"
+#include "window.c"
+
+#include "faults.c"
+#include "implausible.c"
+#include "tare.c"
+#include "field.c"
+#include "masks.c"
+#include "motion.c"
+#include "stream.c"
+#include "tables.c"
 
 #include "contact.c"
 #include "heads.c"

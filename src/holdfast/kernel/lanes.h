@@ -1,6 +1,6 @@
 /* Several taxels at a time: the order of sums over taxels, and numbers as wide as a register.
  *
- * Values of taxels stand in lanes (kernel.h). Every sum over taxels has four parts: lane l adds up
+ * Values of taxels stand in lanes (holdfast.h). Every sum over taxels has four parts: lane l adds up
  * taxels l, l + 4, l + 8, ..., and the total is (lane 0 + lane 1) + (lane 2 + lane 3). So all
  * compilers get the same bits. Lanes without a taxel, and ignored taxels, add 0.
  *
@@ -18,7 +18,7 @@
 #ifndef HF_LANES_H
 #define HF_LANES_H
 
-#include "kernel.h"
+#include "holdfast.h"
 
 /* Return the second number if it is larger, else the first. NaN stays only if it is the first. */
 static inline hf_real hf_max(hf_real a, hf_real b)

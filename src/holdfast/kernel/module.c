@@ -14,7 +14,7 @@
 
 #include "arrays.h"
 #include "batch.h"
-#include "detector.h"
+#include "holdfast.h"
 #include "finger.h"
 
 /* The size of the scratch memory of a longer window, ten rows of doubles, could overflow. */

@@ -1,4 +1,4 @@
-/* One sample of a hand, in the order of kernel.h: is it valid and plausible, changes, tare, field,
+/* One sample of a hand, in the order of holdfast.h: is it valid and plausible, changes, tare, field,
  * masks, force and features. */
 #include "finger.h"
 

@@ -10,8 +10,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-HEADERS = ("kernel.h", "detector.h")
-"""Files with the structs that C and Python share, in the order of their includes."""
 C_TYPES: dict[str, npt.DTypeLike] = {
     "double": np.float64, "bool": np.bool_, "size_t": np.uintp, "int32_t": np.int32,
     "uint32_t": np.uint32, "int64_t": np.int64, "uint64_t": np.uint64,
@@ -112,19 +110,18 @@ def _length(expression: str, numbers: Mapping[str, int]) -> int:
 
 
 @cache
+def _header() -> str:
+    return (resources.files("holdfast.kernel") / "holdfast.h").read_text("utf-8")
+
+
+@cache
 def _extension_fields() -> dict[str, list[Field]]:
-    return fields_of(_headers())
+    return fields_of(_header())
 
 
 @cache
 def _extension_types() -> dict[str, np.dtype[Any]]:
-    return types_of(_headers())
-
-
-@cache
-def _headers() -> str:
-    folder = resources.files("holdfast.kernel")
-    return "".join((folder / name).read_text("utf-8") for name in HEADERS)
+    return types_of(_header())
 
 
 def struct_type(name: str) -> np.dtype[Any]:

@@ -1,4 +1,7 @@
-/* The kernel of holdfast: all that happens at a tactile sample of a robot hand, up to the features.
+/* The detector of holdfast: from the readings of a hand at a tactile sample to its contact states.
+ *
+ * This header is the only definition of what C and Python share: Python reads the layout of the
+ * structs from it (structs.py), and an exported header begins with it.
  *
  * What it is
  *   A hand is a few fingers (fingertips, pads). A finger has one sensor of n_taxels taxels, each of
@@ -10,23 +13,37 @@
  *              -> faulty taxels filled in (masks.c)
  *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c)
  *              -> features (stream.c)
+ *              -> contact? (contact.c) -> heads: stable, slip, slip_speed, cause (heads.c)
+ *              -> forward filter, hysteresis, hold, minimum duration (decision.c)
+ *              -> state of each finger and of the hand (detector.c)
  *
- *   The first step that refuses the sample ends it: its `reason` is then not HOLDFAST_READY, and
- *   the finger has no features. The state machine of a finger, by its reason:
+ *   The first step up to the features that refuses the sample ends it: its `reason` is then not
+ *   HOLDFAST_READY, and the finger has no features. The state machine of a finger, by its reason:
  *
  *     TARE ----> WARM_UP ----> READY      the tare is complete; then the windows are full
  *                  ^             |
  *     FAULT <------+---- GAP <---+        a gap, or a fault of the finger, starts the windows again
  *
- * The life of a stream
- *   1. Tables (`holdfast_hand`) are constants: sensors, features, tare, rate. They come from a
- *      model. `holdfast_check` refuses tables whose sizes or indices do not fit: once, before the
+ *   A finger without features is UNKNOWN at once, but a fault that leaves a force is reported only
+ *   when it has lasted. The state machine of a finger in contact:
+ *
+ *     NO_CONTACT --touch--> UNSTABLE --hold time over, p >= threshold--> STABLE
+ *         ^                    ^  |                                        |
+ *         +----- at rest ------+  +----- p < threshold, or a jerk <--------+
+ *
+ * The life of a stream, and of a detector
+ *   1. Tables are constants: `holdfast_hand` (sensors, features, tare, rate) of a stream, and
+ *      `holdfast_model` (heads and limits of each finger) of a detector. `holdfast_check` and
+ *      `holdfast_check_model` refuse tables whose sizes or indices do not fit: once, before the
  *      first sample. No other function checks them again.
- *   2. Memory. With sizes as fields, the caller gives `holdfast_memory_size` bytes to
- *      `holdfast_use_memory`. With sizes as macros (see below), `holdfast_memory` holds all of it.
- *   3. `holdfast_begin` sets the memory to that before the first sample. Call it again to reset.
- *   4. `holdfast_advance` processes a sample. The result is in `memory->values` and
- *      `memory->features`, until the next sample.
+ *   2. Memory (memory.h). With sizes as fields, the caller gives `holdfast_memory_size` bytes to
+ *      `holdfast_use_memory` (of a detector `holdfast_detector_size`,
+ *      `holdfast_detector_use_memory`). With sizes as macros, the structs hold all of it.
+ *   3. `holdfast_begin` sets a stream to that before the first sample, `holdfast_start` a detector.
+ *      Call it again to reset.
+ *   4. `holdfast_advance` computes the features of a sample, in `memory->values` and
+ *      `memory->features`. `holdfast_detect` does so, decides, and fills estimates of the caller.
+ *   In an exported header, `holdfast_init` and `holdfast_update` do 3 and 4 with its tables.
  *
  * Who owns memory
  *   The caller owns tables and memory; nothing is allocated, and no global changes. Two streams of
@@ -42,8 +59,8 @@
  *   Readings and forces are in the unit of the sensor (counts, or N), times in seconds on the clock
  *   of the caller. Taxel frames have z along the outward normal, positive when pressed.
  */
-#ifndef HF_KERNEL_H
-#define HF_KERNEL_H
+#ifndef HF_HOLDFAST_H
+#define HF_HOLDFAST_H
 
 #include <float.h>
 #include <math.h>
@@ -119,11 +136,13 @@ enum {
     HOLDFAST_TARE = 1,    /* the tare, or the noise, is not complete */
     HOLDFAST_WARM_UP = 2, /* its windows are not full yet */
     HOLDFAST_GAP = 3,     /* they are not full again after a gap */
-    HOLDFAST_FAULT = 4    /* its readings cannot be used, see the faults */
+    HOLDFAST_FAULT = 4,   /* its readings cannot be used, see the faults */
+    /* Why a finger is UNSTABLE whatever its probability: */
+    HOLDFAST_LOAD = 5, /* a large share of the load comes or goes */
+    HOLDFAST_HOLD = 6  /* it was unstable within the hold time, or STABLE has not lasted yet */
 };
 
-/* Faults, one bit each. Bit 128 is in detector.h. The other missing bits belong to the transport,
- * which is not part of a kernel. */
+/* Faults, one bit each. The missing bits belong to the transport, which is not part of a kernel. */
 enum {
     HOLDFAST_NOT_FINITE = 1,    /* a reading is NaN or infinite */
     HOLDFAST_STUCK = 2,         /* readings changed, and do not any more */
@@ -132,6 +151,7 @@ enum {
     HOLDFAST_DEAD = 16,         /* a taxel never changed, while others do */
     HOLDFAST_NOISY = 32,        /* a taxel jumps by far more than its noise */
     HOLDFAST_OUT_OF_RANGE = 64, /* a reading that the sensor cannot send */
+    HOLDFAST_TARE_DRIFT = 128,  /* the force without contact crept over the threshold of contact */
     HOLDFAST_OFFSET = 8192,     /* all readings have left the tare together */
     HOLDFAST_REPEATED = 16384,  /* the last samples repeat those before them */
     HOLDFAST_FIELD = 32768,     /* a magnetic field, or a load: all taxels changed nearly alike */
@@ -196,6 +216,38 @@ enum {
     HF_MAX_TAXELS = 65536, /* of a hand: bounds all sizes, so that no product overflows */
     HF_MAX_SAMPLES = 1048576,
     HF_MAX_FEATURES = 4096
+};
+
+/* State of a finger, and of the hand. */
+enum { HOLDFAST_UNKNOWN = 0, HOLDFAST_NO_CONTACT = 1, HOLDFAST_UNSTABLE = 2, HOLDFAST_STABLE = 3 };
+
+/* Likely cause while a finger is UNSTABLE; slip also whenever the head `slip` decides so. */
+enum {
+    HOLDFAST_NO_CAUSE = 0,
+    HOLDFAST_CAUSE_CLOSING = 1,
+    HOLDFAST_CAUSE_DISTURBANCE = 2,
+    HOLDFAST_CAUSE_SLIP = 3,
+    HOLDFAST_CAUSE_LOST = 4,
+    HOLDFAST_CAUSE_RELEASED = 5,
+    HOLDFAST_CAUSE_GLITCH = 6,
+    HOLDFAST_N_CAUSES = 6
+};
+
+/* How contact is found. */
+enum {
+    HOLDFAST_ALWAYS_CONTACT = 0,   /* the model has no threshold */
+    HOLDFAST_CONTACT_BY_FORCE = 1, /* F_a over a limit [unit of the readings] */
+    HOLDFAST_CONTACT_BY_NOISE = 2, /* F_a over a multiple of its noise */
+    HOLDFAST_CONTACT_BY_LOAD = 3   /* load of relative features over a multiple of its noise */
+};
+
+/* Answers about a finger. */
+enum {
+    HOLDFAST_HEAD_STABLE = 0, /* p = 1 / (1 + exp(-z)) */
+    HOLDFAST_HEAD_SLIP = 1,   /* likewise, of the smoothed z */
+    HOLDFAST_HEAD_SPEED = 2,  /* min(max(z, 0)^2, highest) [mm/s] */
+    HOLDFAST_HEAD_CAUSE = 3,  /* the cause with the largest sum of z since the finger is unstable */
+    HOLDFAST_N_HEADS = 4
 };
 
 /* Constants of a finger. */
@@ -271,185 +323,69 @@ typedef struct {
     const hf_real *positions;         /* (3 n_lanes) from the centroid, in radii of the patch */
 } holdfast_hand;
 
-/* A set of taxels of a finger: bit i % 64 of word i / 64 is taxel i. Other bits are 0. */
+/* A head. Output k has the value
+ *
+ *     z_k = w_k0 + sum_j w_kj phi_j + sum_j q_j min(|u_j|, 5)^2,  u_j = (phi_j - mean_j) / scale_j
+ *
+ * over the first features of the finger, in their order. Mean, scale and calibration are folded
+ * into w. Its numbers stand in `weights` of the model: (n_outputs, 1 + n_features) w, then with
+ * squares (3, n_features) mean, 1 / scale and q. */
 typedef struct {
-    uint64_t words[HOLDFAST_MASK_WORDS];
-} holdfast_taxel_set;
+    size_t n_outputs;  /* 0: the model has no such head */
+    size_t n_features; /* up to the last one that it uses */
+    size_t first;      /* its first number in `weights` */
+    bool has_squares;
+    hf_real threshold; /* of the probability */
+    hf_real gain;      /* share of a new sample in the smoothed z; 1 without smoothing */
+    hf_real hold;      /* time for which a slip is still reported [s] */
+    hf_real highest;   /* speed [mm/s] */
+    int32_t causes[6]; /* (n_outputs) cause of each output, ascending; of the cause alone */
+} holdfast_head;
 
-/* Changes of a taxel, to find whether it is faulty (faults.c). */
+/* Heads and limits of a finger. */
 typedef struct {
-    int64_t n_changed;     /* samples that changed the taxel */
-    int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
-    int64_t longest_still; /* most successive samples without a change, of those that changed the
-                              finger */
-    /* Of each axis of a magnetometer, which is compared every 0.15 s: */
-    hf_real compared[3];     /* reading */
-    int32_t n_same[3];       /* comparisons since it last differed */
-    int32_t longest_same[3]; /* most of these that were no fault */
-    int32_t n_differed[3];   /* comparisons at which it differed */
-} holdfast_taxel;
+    holdfast_head heads[4]; /* (HOLDFAST_N_HEADS) */
+    int32_t contact;        /* HOLDFAST_ALWAYS_CONTACT, ... */
+    hf_real contact_limit;  /* [unit of the readings], or a multiple of the noise */
+} holdfast_rule;
 
-/* What replaces a taxel that is left out (masks.c). */
+/* Tables of a detector: constants. */
 typedef struct {
-    hf_real last_healthy[3]; /* reading beyond rest when the mask last changed */
-    hf_real fade[3];         /* is added to the reading of a taxel that came back */
-    double masked_at;        /* time from which it is left out [s] */
-    bool unweighed;          /* it is left out, and its share of the load is not known */
-} holdfast_mask;
+    const holdfast_hand *hand;
+    const holdfast_rule *rules; /* (n_fingers) */
+    const hf_real *weights;     /* (n_weights) */
+    size_t n_weights;
+    size_t n_model_fingers; /* a hand of one is STABLE by one finger, else by two */
+    hf_real hysteresis;     /* of the threshold of stability, on both sides */
+    hf_real min_duration;   /* that a state must last before it is reported [s] */
+    hf_real hold;           /* time for which UNSTABLE is held [s] */
+    bool has_filter;        /* the forward filter is used */
+    hf_real switching;      /* how often a contact turns from one state to the other [1/s] */
+    bool zero_unknown;      /* the first samples are load, and no readings without are known */
+} holdfast_model;
 
-/* A taxel in a ring of samples that may repeat (implausible.c). */
+/* Estimate of a finger. Numbers that the model does not give are NaN. */
 typedef struct {
-    hf_real anchor[3]; /* reading of the sample from which on the ring is followed */
-    bool varies[3];    /* the reading differed from it in the period after it */
-} holdfast_ring;
+    double time;     /* of its last sample [s] */
+    int32_t state;   /* HOLDFAST_UNKNOWN, ... */
+    int32_t reason;  /* HOLDFAST_TARE, ...: why it is UNKNOWN; HOLDFAST_LOAD, ... */
+    int32_t cause;   /* HOLDFAST_CAUSE_CLOSING, ... */
+    uint32_t faults; /* HOLDFAST_NOT_FINITE, ... */
+    /* Bit i % 64 of word i / 64: taxel i of the finger is faulty by itself. */
+    uint64_t faulty_taxels[HOLDFAST_MASK_WORDS];
+    hf_real stable_probability; /* NaN while UNKNOWN */
+    hf_real slip_probability;
+    hf_real slip_speed;    /* [mm/s] */
+    hf_real slip_distance; /* slid since the slip began [mm] */
+    hf_real instability;   /* sigma [unit of the readings] */
+    hf_real force[3];      /* F_tip in the fingertip frame [unit of the readings] */
+} holdfast_finger_estimate;
 
-/* A sample in the ring of relative features (motion.c). */
-typedef struct {
-    double time;         /* [s] */
-    hf_real force[3];    /* F_tip */
-    hf_real pressure[3]; /* centre of pressure, in radii of the patch */
-    hf_real moment;      /* about the normal, divided by the radius */
-    hf_real ratio;       /* of tangential to normal force, beyond the reference */
-} holdfast_track;
-
-/* Load and noise of a finger with relative features (motion.c). */
-typedef struct {
-    int64_t n_samples;       /* since the last fault, or gap that is not bridged */
-    hf_real least_normal;    /* normal force of the reference: the least so far, at most 0 */
-    hf_real reference[3];    /* F_tip at the least normal force */
-    hf_real load;            /* force beyond the reference */
-    hf_real peak_load;       /* the largest so far, slowly forgotten */
-    hf_real taxel_load;      /* root of the sum of squares of the taxel forces beyond it */
-    hf_real peak_taxel_load; /* the largest so far, slowly forgotten */
-    hf_real noise;           /* of F_tip, standard deviation of the norm */
-    hf_real taxel_noise;     /* of all taxels, standard deviation of the norm */
-    hf_real least_noise;     /* of the blocks that are complete; infinite before */
-    hf_real least_taxel_noise;
-    hf_real block_squares; /* of the steps of F_tip in the block that is not complete */
-    hf_real block_taxel_squares;
-    int64_t block_steps;       /* their number */
-    double block_start;        /* [s]; NaN before the first sample */
-    double moved_at;           /* when the force last moved by much more than its noise [s] */
-    hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
-    hf_real pressure;          /* sum of |h_i . n| over the taxels */
-    hf_real pressure_squares;  /* sum of their squares */
-    hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
-    hf_real tangent[3];        /* direction of the tangential force */
-    hf_real contact_zero[3];   /* F_tip without contact: of the tare, or of a release since */
-    hf_real contact_load;      /* force beyond contact_zero */
-    hf_real peak_contact_load; /* the largest so far, slowly forgotten */
-} holdfast_motion;
-
-/* Memory of a finger. */
-typedef struct {
-    /* Time and stretches (stream.c). */
-    double first_time; /* of the first valid sample [s]; NaN before */
-    double last_time;  /* of the last sample [s]; NaN before */
-    int64_t n_seen;    /* valid samples so far */
-    int64_t n_stretch; /* forces since a gap, a refused sample or a fault: the windows hold these */
-    bool after_gap;    /* a stretch after a gap warms up */
-    size_t row;        /* of the newest force in the rings of history and blocks */
-    /* Tare and noise (tare.c). */
-    bool is_tared;         /* the baseline is frozen */
-    int64_t n_tared;       /* samples in the baseline so far */
-    hf_real squared_steps; /* sum of squared steps of the force, while the noise is measured */
-    int64_t n_steps;       /* their number */
-    hf_real noise;         /* standard deviation of a component by noise alone; NaN before */
-    hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
-    int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
-    /* Changes and faulty taxels (faults.c). */
-    int64_t n_unchanged;   /* samples since the readings last changed */
-    int64_t n_changes;     /* samples that changed the readings */
-    int64_t longest_rest;  /* most samples without a change, if long and not by a fault */
-    uint32_t taxel_faults; /* faults of single taxels at the last sample that changed a reading */
-    holdfast_taxel_set faulty_taxels; /* those taxels */
-    holdfast_taxel_set noisy_taxels;  /* the noisy ones among them */
-    holdfast_taxel_set stuck_axes[3]; /* magnetometers of which this axis does not change */
-    bool has_stuck_axis[3];           /* there are some */
-    /* Taxels that are left out (masks.c). */
-    int64_t n_refused;         /* successive samples of the tare with a reading that is not valid */
-    holdfast_taxel_set lost;   /* taxels that have no tare */
-    uint32_t lost_faults;      /* their faults; 0 without any */
-    holdfast_taxel_set masked; /* taxels that are left out */
-    bool has_masked;           /* there are some */
-    bool too_many;             /* the others carry too little of the load */
-    bool load_known;           /* the load was known when the mask last changed */
-    bool unloaded;             /* this load has gone */
-    bool fading;               /* the value of a taxel that came back still fades */
-    hf_real fill_squares;      /* sum of the squares of last_healthy, of the healthy taxels */
-    hf_real fill_ratio;        /* load of the healthy taxels, beside that when the mask changed */
-    /* Magnetic field that all taxels read (field.c). */
-    hf_real field[3];       /* that is taken out of all readings */
-    hf_real still_field[3]; /* the same, when the readings did not move together last */
-    bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
-    hf_real common[6];      /* the readings' mean beyond the tare in both frames, smoothed */
-    hf_real speed[6];       /* of these, smoothed, too [unit of the readings / s] */
-    hf_real field_speed;    /* square of the field's, if it moves and the finger is open; else 0 */
-    bool field_is_load;     /* the taxels moved alike, as no field does */
-    bool is_shared;         /* the field was found by the help of another module */
-    bool is_deep;           /* a load hides the field */
-    int32_t n_skipped;      /* samples whose field was not looked for since, under such a load */
-    bool has_new_field;     /* the field changed at this sample */
-    bool is_untouched;      /* but for it, all taxels read what they did in the tare */
-    int64_t n_unclear;      /* successive samples that may be of a field or of a load */
-    /* Implausible samples (implausible.c). */
-    holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
-    hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
-    uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
-    uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */
-    uint64_t ring_length;      /* successive samples with the sum of that a period before */
-    uint64_t ring_age;         /* samples since the ring is followed */
-    bool ring_varies;          /* enough readings and samples of the ring differ */
-    holdfast_motion motion;
-} holdfast_finger_memory;
-
-/* Result of a finger at its last sample; NaN where there is none. */
-typedef struct {
-    int32_t reason;            /* HOLDFAST_READY, ... */
-    uint32_t faults;           /* HOLDFAST_NOT_FINITE, ... */
-    holdfast_taxel_set taxels; /* that are faulty by themselves; if there are, so are faults */
-    hf_real force[3];          /* F_tip */
-    hf_real amplitude;         /* F_a = |F_tip| */
-    hf_real m;                 /* equation 1, over sigma_window */
-    hf_real sigma;             /* equation 2, over sigma_window */
-} holdfast_values;
-
-/* Memory of a stream. (clang-format takes the products for pointers.) */
-/* clang-format off */
-typedef struct {
-    HF_ARRAY(holdfast_values, values, HOLDFAST_N_FINGERS);
-    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES);
-    HF_ARRAY(holdfast_finger_memory, fingers, HOLDFAST_N_FINGERS);
-    HF_ARRAY(holdfast_taxel, taxels, HOLDFAST_N_LANES);
-    HF_ARRAY(holdfast_mask, masks, HOLDFAST_N_LANES);
-    HF_ARRAY(holdfast_ring, rings, HOLDFAST_N_LANES);
-    HF_ARRAY(hf_real, readings, 3 * HOLDFAST_N_LANES);  /* of this sample */
-    HF_ARRAY(hf_real, previous, 3 * HOLDFAST_N_LANES);  /* of the last valid sample */
-    HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
-    HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
-    HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
-    HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
-    HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
-                                                           of its second differences */
-    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
-    /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
-    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);
-    HF_ARRAY(hf_real, blocks, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HOLDFAST_N_CHANNELS *
-                                  HOLDFAST_N_LEVELS * HF_N_SUMS);
-    /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
-    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
-    HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
-    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
-    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
-    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
-    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before `of_hand` */
-    HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
-} holdfast_memory;
-/* clang-format on */
+#include "memory.h"
 
 /* Each file can be compiled by itself: then HF_SHARED, before functions that files share, and
  * HF_API, before those of the interface, give names to the linker. A file that joins the others
- * (kernel.c) defines HF_SHARED as static: compilers then see all functions, and an exported header
+ * (holdfast.c) defines HF_SHARED as static: compilers then see all functions, and an exported header
  * is part of each source file that includes it. */
 #ifndef HF_API
 #ifdef HF_SHARED
@@ -491,6 +427,42 @@ HF_API void holdfast_begin(
 HF_API void holdfast_advance(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *readings,
     const bool *present, double time);
+
+/* Return NULL if the tables fit each other and `holdfast_check` passes, else what is wrong. */
+HF_API const char *holdfast_check_model(const holdfast_model *model);
+
+#ifndef HOLDFAST_N_FINGERS
+/* Return the size of the memory of a detector, beside its struct [bytes]. */
+HF_API size_t holdfast_detector_size(const holdfast_model *model);
+
+/* Set the arrays of a detector to parts of a block of that size, aligned as for double. */
+HF_API void holdfast_detector_use_memory(
+    const holdfast_model *model, holdfast_detector_memory *d, void *block);
+#endif
+
+/* Set a detector to that before the first sample.
+ *
+ * baseline: (n_taxels, 3) readings without contact, of all fingers; NULL for none. */
+HF_API void holdfast_start(
+    const holdfast_model *model, holdfast_detector_memory *d, const hf_real *baseline);
+
+/* Set the decisions alone to those before the first sample. */
+HF_API void holdfast_start_decisions(const holdfast_model *model, holdfast_detector_memory *d);
+
+/* Fill (n_taxels, 3) with the tare of a finger. Return whether it is complete. */
+HF_API bool holdfast_baseline(
+    const holdfast_model *model, const holdfast_detector_memory *d, size_t finger, hf_real *out);
+
+/* Process one sample of a hand, and fill (n_fingers) estimates. Return the state of the hand.
+ *
+ * time, readings, present: as of `holdfast_advance`. */
+HF_API int32_t holdfast_detect(
+    const holdfast_model *model, holdfast_detector_memory *d, double time, const hf_real *readings,
+    const bool *present, holdfast_finger_estimate *estimates);
+
+/* Fill (n_fingers) estimates of the last sample again. */
+HF_API void holdfast_estimates(
+    const holdfast_model *model, holdfast_detector_memory *d, holdfast_finger_estimate *estimates);
 
 #ifdef __cplusplus
 }

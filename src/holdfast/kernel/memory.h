@@ -1,0 +1,219 @@
+/* The memory of a stream and of a detector: a part of holdfast.h, which includes it. */
+#ifndef HF_MEMORY_H
+#define HF_MEMORY_H
+
+/* A set of taxels of a finger: bit i % 64 of word i / 64 is taxel i. Other bits are 0. */
+typedef struct {
+    uint64_t words[HOLDFAST_MASK_WORDS];
+} holdfast_taxel_set;
+
+/* Changes of a taxel, to find whether it is faulty (faults.c). */
+typedef struct {
+    int64_t n_changed;     /* samples that changed the taxel */
+    int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
+    int64_t longest_still; /* most successive samples without a change, of those that changed the
+                              finger */
+    /* Of each axis of a magnetometer, which is compared every 0.15 s: */
+    hf_real compared[3];     /* reading */
+    int32_t n_same[3];       /* comparisons since it last differed */
+    int32_t longest_same[3]; /* most of these that were no fault */
+    int32_t n_differed[3];   /* comparisons at which it differed */
+} holdfast_taxel;
+
+/* What replaces a taxel that is left out (masks.c). */
+typedef struct {
+    hf_real last_healthy[3]; /* reading beyond rest when the mask last changed */
+    hf_real fade[3];         /* is added to the reading of a taxel that came back */
+    double masked_at;        /* time from which it is left out [s] */
+    bool unweighed;          /* it is left out, and its share of the load is not known */
+} holdfast_mask;
+
+/* A taxel in a ring of samples that may repeat (implausible.c). */
+typedef struct {
+    hf_real anchor[3]; /* reading of the sample from which on the ring is followed */
+    bool varies[3];    /* the reading differed from it in the period after it */
+} holdfast_ring;
+
+/* A sample in the ring of relative features (motion.c). */
+typedef struct {
+    double time;         /* [s] */
+    hf_real force[3];    /* F_tip */
+    hf_real pressure[3]; /* centre of pressure, in radii of the patch */
+    hf_real moment;      /* about the normal, divided by the radius */
+    hf_real ratio;       /* of tangential to normal force, beyond the reference */
+} holdfast_track;
+
+/* Load and noise of a finger with relative features (motion.c). */
+typedef struct {
+    int64_t n_samples;       /* since the last fault, or gap that is not bridged */
+    hf_real least_normal;    /* normal force of the reference: the least so far, at most 0 */
+    hf_real reference[3];    /* F_tip at the least normal force */
+    hf_real load;            /* force beyond the reference */
+    hf_real peak_load;       /* the largest so far, slowly forgotten */
+    hf_real taxel_load;      /* root of the sum of squares of the taxel forces beyond it */
+    hf_real peak_taxel_load; /* the largest so far, slowly forgotten */
+    hf_real noise;           /* of F_tip, standard deviation of the norm */
+    hf_real taxel_noise;     /* of all taxels, standard deviation of the norm */
+    hf_real least_noise;     /* of the blocks that are complete; infinite before */
+    hf_real least_taxel_noise;
+    hf_real block_squares; /* of the steps of F_tip in the block that is not complete */
+    hf_real block_taxel_squares;
+    int64_t block_steps;       /* their number */
+    double block_start;        /* [s]; NaN before the first sample */
+    double moved_at;           /* when the force last moved by much more than its noise [s] */
+    hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
+    hf_real pressure;          /* sum of |h_i . n| over the taxels */
+    hf_real pressure_squares;  /* sum of their squares */
+    hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
+    hf_real tangent[3];        /* direction of the tangential force */
+    hf_real contact_zero[3];   /* F_tip without contact: of the tare, or of a release since */
+    hf_real contact_load;      /* force beyond contact_zero */
+    hf_real peak_contact_load; /* the largest so far, slowly forgotten */
+} holdfast_motion;
+
+/* Memory of a finger. */
+typedef struct {
+    /* Time and stretches (stream.c). */
+    double first_time; /* of the first valid sample [s]; NaN before */
+    double last_time;  /* of the last sample [s]; NaN before */
+    int64_t n_seen;    /* valid samples so far */
+    int64_t n_stretch; /* forces since a gap, a refused sample or a fault: the windows hold these */
+    bool after_gap;    /* a stretch after a gap warms up */
+    size_t row;        /* of the newest force in the rings of history and blocks */
+    /* Tare and noise (tare.c). */
+    bool is_tared;         /* the baseline is frozen */
+    int64_t n_tared;       /* samples in the baseline so far */
+    hf_real squared_steps; /* sum of squared steps of the force, while the noise is measured */
+    int64_t n_steps;       /* their number */
+    hf_real noise;         /* standard deviation of a component by noise alone; NaN before */
+    hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
+    int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
+    /* Changes and faulty taxels (faults.c). */
+    int64_t n_unchanged;   /* samples since the readings last changed */
+    int64_t n_changes;     /* samples that changed the readings */
+    int64_t longest_rest;  /* most samples without a change, if long and not by a fault */
+    uint32_t taxel_faults; /* faults of single taxels at the last sample that changed a reading */
+    holdfast_taxel_set faulty_taxels; /* those taxels */
+    holdfast_taxel_set noisy_taxels;  /* the noisy ones among them */
+    holdfast_taxel_set stuck_axes[3]; /* magnetometers of which this axis does not change */
+    bool has_stuck_axis[3];           /* there are some */
+    /* Taxels that are left out (masks.c). */
+    int64_t n_refused;         /* successive samples of the tare with a reading that is not valid */
+    holdfast_taxel_set lost;   /* taxels that have no tare */
+    uint32_t lost_faults;      /* their faults; 0 without any */
+    holdfast_taxel_set masked; /* taxels that are left out */
+    bool has_masked;           /* there are some */
+    bool too_many;             /* the others carry too little of the load */
+    bool load_known;           /* the load was known when the mask last changed */
+    bool unloaded;             /* this load has gone */
+    bool fading;               /* the value of a taxel that came back still fades */
+    hf_real fill_squares;      /* sum of the squares of last_healthy, of the healthy taxels */
+    hf_real fill_ratio;        /* load of the healthy taxels, beside that when the mask changed */
+    /* Magnetic field that all taxels read (field.c). */
+    hf_real field[3];       /* that is taken out of all readings */
+    hf_real still_field[3]; /* the same, when the readings did not move together last */
+    bool field_is_turned;   /* these are in the fingertip frame, not in the taxel frames */
+    hf_real common[6];      /* the readings' mean beyond the tare in both frames, smoothed */
+    hf_real speed[6];       /* of these, smoothed, too [unit of the readings / s] */
+    hf_real field_speed;    /* square of the field's, if it moves and the finger is open; else 0 */
+    bool field_is_load;     /* the taxels moved alike, as no field does */
+    bool is_shared;         /* the field was found by the help of another module */
+    bool is_deep;           /* a load hides the field */
+    int32_t n_skipped;      /* samples whose field was not looked for since, under such a load */
+    bool has_new_field;     /* the field changed at this sample */
+    bool is_untouched;      /* but for it, all taxels read what they did in the tare */
+    int64_t n_unclear;      /* successive samples that may be of a field or of a load */
+    /* Implausible samples (implausible.c). */
+    holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
+    hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
+    uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
+    uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */
+    uint64_t ring_length;      /* successive samples with the sum of that a period before */
+    uint64_t ring_age;         /* samples since the ring is followed */
+    bool ring_varies;          /* enough readings and samples of the ring differ */
+    holdfast_motion motion;
+} holdfast_finger_memory;
+
+/* Result of a finger at its last sample; NaN where there is none. */
+typedef struct {
+    int32_t reason;            /* HOLDFAST_READY, ... */
+    uint32_t faults;           /* HOLDFAST_NOT_FINITE, ... */
+    holdfast_taxel_set taxels; /* that are faulty by themselves; if there are, so are faults */
+    hf_real force[3];          /* F_tip */
+    hf_real amplitude;         /* F_a = |F_tip| */
+    hf_real m;                 /* equation 1, over sigma_window */
+    hf_real sigma;             /* equation 2, over sigma_window */
+} holdfast_values;
+
+/* Memory of a stream. (clang-format takes the products for pointers.) */
+/* clang-format off */
+typedef struct {
+    HF_ARRAY(holdfast_values, values, HOLDFAST_N_FINGERS);
+    HF_ARRAY(hf_real, features, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES);
+    HF_ARRAY(holdfast_finger_memory, fingers, HOLDFAST_N_FINGERS);
+    HF_ARRAY(holdfast_taxel, taxels, HOLDFAST_N_LANES);
+    HF_ARRAY(holdfast_mask, masks, HOLDFAST_N_LANES);
+    HF_ARRAY(holdfast_ring, rings, HOLDFAST_N_LANES);
+    HF_ARRAY(hf_real, readings, 3 * HOLDFAST_N_LANES);  /* of this sample */
+    HF_ARRAY(hf_real, previous, 3 * HOLDFAST_N_LANES);  /* of the last valid sample */
+    HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
+    HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
+    HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
+    HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
+    HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
+                                                           of its second differences */
+    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
+    /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
+    HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);
+    HF_ARRAY(hf_real, blocks, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HOLDFAST_N_CHANNELS *
+                                  HOLDFAST_N_LEVELS * HF_N_SUMS);
+    /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
+    HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
+    HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
+    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
+    HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
+    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
+    HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before `of_hand` */
+    HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
+} holdfast_memory;
+/* clang-format on */
+
+/* What is remembered of the decisions about a finger. Times are NaN where there was none.
+ *
+ * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at and loaded_at;
+ * heads.c scores and all about slips; decision.c the rest. */
+typedef struct {
+    int32_t state;            /* that is reported */
+    int32_t candidate;        /* of the last sample; may not have lasted long enough yet */
+    int32_t excess;           /* how the load came over the threshold of contact, see contact.c */
+    int32_t cause;            /* while unstable */
+    bool slips;               /* the finger is decided to slide */
+    bool is_unsteady;         /* the load came or went at the last sample, see contact.c */
+    hf_real probability;      /* of stability; NaN without an estimate */
+    double candidate_since;   /* [s] */
+    double last_unstable;     /* last sample that was unstable before the hold time [s] */
+    hf_real smoothed;         /* F_a, smoothed over 1 s; NaN before */
+    double restless_at;       /* when the finger was last not calm [s] */
+    hf_real rest[3];          /* F_tip without contact, beyond the tare */
+    hf_real peak;             /* largest load so far, slowly forgotten */
+    double shaken_at;         /* when sigma was last much larger than that of noise [s] */
+    double loaded_at;         /* when the load was last that of a contact [s] */
+    hf_real filtered;         /* log odds by the forward filter; NaN before its first sample */
+    double filtered_at;       /* time of that sample [s] */
+    hf_real slip_log_odds;    /* smoothed; NaN before its first sample */
+    hf_real slip_probability; /* NaN without an estimate */
+    double last_slip;         /* last sample over the threshold [s] */
+    hf_real speed;            /* of the slip [mm/s]; NaN without an estimate */
+    hf_real distance;         /* slid since the slip began [mm]; likewise */
+    double slid_at;           /* last sample that slides [s]; NaN while it does not slide */
+    hf_real scores[6];        /* (HOLDFAST_N_CAUSES) sums of z since the contact is unstable */
+} holdfast_decision;
+
+/* Memory of a detector. */
+typedef struct {
+    holdfast_memory memory;
+    HF_ARRAY(holdfast_decision, decisions, HOLDFAST_N_FINGERS);
+    int32_t state; /* of the hand */
+} holdfast_detector_memory;
+
+#endif
