@@ -13,7 +13,7 @@ from holdfast.cli.terminal.console import (
 
 if TYPE_CHECKING:
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
-    from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+    from holdfast.metrics.slip_curves import SlipIntervals, SlipSummary
     from holdfast.metrics.slips import SlipMetrics
     from holdfast.training import CurvePoint
     from holdfast.training.evaluation import Evaluation

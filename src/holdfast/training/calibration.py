@@ -1,7 +1,7 @@
 """Calibration: location, scale and thresholds of a model from its user's own handling."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import msgspec
@@ -12,12 +12,6 @@ from holdfast.detection.specs import KINDS
 from holdfast.errors import ModelError, TrainingError
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast.training.operating_point import (
-    GraspingFinger,
-    GraspingFingers,
-    HandlingFigures,
-    choose_operating_point,
-)
 from holdfast.training.own_handling import (
     ENOUGH_HANDLING,
     MAX_HANDLING,
@@ -27,7 +21,14 @@ from holdfast.training.own_handling import (
     grasped_samples,
     location_and_scale,
 )
-from holdfast.training.replay import ThresholdReplay
+from holdfast.training.thresholds import (
+    GraspingFinger,
+    GraspingFingers,
+    HandlingFigures,
+    Steps,
+    ThresholdReplay,
+    choose_handling_thresholds,
+)
 
 MAX_FINGERS_SHOWN = 5
 STILL_CHANGE = 0.03
@@ -40,9 +41,6 @@ MAX_ACTIVITY = 2.0
 more in the held samples in which it does not slide; over half have more while they slide."""
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
-
-Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
-
 
 COMPARED_FIGURES = (
     ("STABLE in the held samples [%]", "stable", 1),
@@ -292,7 +290,7 @@ class _Calibration:
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            chosen = choose_operating_point(after[key], part, false_alarms, moves=moves)
+            chosen = choose_handling_thresholds(after[key], part, false_alarms, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
         model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)

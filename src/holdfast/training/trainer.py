@@ -15,7 +15,7 @@ from holdfast.metrics import (
     ResultTotal,
     score_recording,
 )
-from holdfast.metrics.slips import SlipCurve
+from holdfast.metrics.slips import SlipCounts
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -44,12 +44,8 @@ from holdfast.training.model_fit import (
     training_record,
 )
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
-from holdfast.training.slip_threshold import (
-    NO_SLIP_DECISIONS,
-    choose_slip_threshold,
-    with_slip_threshold,
-)
 from holdfast.training.splits import DataSplit, inner_folds, split_data
+from holdfast.training.thresholds import choose_slip_threshold, with_slip_threshold
 from holdfast.training.training_samples import SamplesPlan, gather_samples
 from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
@@ -181,7 +177,7 @@ class OutOfFold(NamedTuple):
     """
 
     metrics: Metrics
-    slip_curves: list[Mapping[str, SlipCurve]]
+    slip_curves: list[Mapping[str, SlipCounts]]
     n_loaded: int
 
 
@@ -377,15 +373,14 @@ class _Trainer:
                 for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
-        chosen = None
-        if model.has_slip_rule:
-            groups = self.data_split.group_of.tolist()
-            chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
-            if chosen is None or chosen.reason:
-                self.warn(NO_SLIP_DECISIONS if chosen is None else chosen.reason)
-        model = with_slip_threshold(model, chosen)
-        slips = chosen.metrics if chosen is not None and model.has_slip_rule else None
-        return model, replace_fields(metrics, slips=slips)
+        if not model.has_slip_rule:
+            return with_slip_threshold(model, None), replace_fields(metrics, slips=None)
+        groups = self.data_split.group_of.tolist()
+        chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
+        if chosen.point is None:
+            self.warn(f"{chosen.reason}; the model gets no slip rule")
+        slips = None if chosen.point is None else chosen.metrics
+        return with_slip_threshold(model, chosen.point), replace_fields(metrics, slips=slips)
 
 
 def _that_fit(
