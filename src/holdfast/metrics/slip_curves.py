@@ -1,23 +1,27 @@
 """Slips at many thresholds: their counts, the choice of a threshold, intervals with the choice."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import msgspec
 import numpy as np
 
-from holdfast.contact import TIME_TOLERANCE
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import (
     BY_THRESHOLD,
-    FOUND_WITHIN,
     SlipCounter,
     SlipCounts,
     SlipMetrics,
+    n_found,
     slip_metrics,
 )
-from holdfast.metrics.statistics import Interval, bootstrap_interval, draw_recordings
+from holdfast.metrics.statistics import (
+    Interval,
+    bootstrap_interval,
+    draw_recordings,
+    ratio_of_sums,
+)
 from holdfast.sensors.types import Array, Integers
 
 LOG_ODDS = np.arange(-160, 161) * 0.05
@@ -36,6 +40,7 @@ experiment."""
 
 MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
+FALSE_ALARMS = "false_alarms_per_minute"
 N_RESAMPLES = 1000
 """Number of resamples of an interval."""
 
@@ -131,22 +136,20 @@ def _ratios(curves: Sequence[SlipCounts]) -> Ratios:
     quiet, held = stacked(c.quiet_seconds for c in curves), stacked(c.held_seconds for c in curves)
     ratios = {
         ("raised_quiet", ""): (stacked(100 * c.raised_seconds for c in curves), quiet),
-        ("false_alarms_per_minute", "quiet"): (stacked(60 * c.false_quiet for c in curves), quiet),
-        ("false_alarms_per_minute", "held"): (stacked(60 * c.false_held for c in curves), held),
+        (FALSE_ALARMS, "quiet"): (stacked(60 * c.false_quiet for c in curves), quiet),
+        (FALSE_ALARMS, "held"): (stacked(60 * c.false_held for c in curves), held),
     }
     for k, name in enumerate(("before_1mm", "before_3mm")):
-        n_found = stacked(100 * c.found_before[:, k] for c in curves)
-        ratios[name, ""] = n_found, stacked(c.n_reached[k] for c in curves)
+        early = stacked(100 * c.found_before[:, k] for c in curves)
+        ratios[name, ""] = early, stacked(c.n_reached[k] for c in curves)
     for name, delays in {
         "incipient": [c.delays for c in curves],
         "gross": [c.gross_delays for c in curves],
         "over_1mm": [c.delays[:, c.is_over_1mm] for c in curves],
     }.items():
-        n = stacked(d.shape[1] for d in delays)
-        found = {"before": [d < -TIME_TOLERANCE for d in delays]}
-        found |= {str(t): [d <= t + TIME_TOLERANCE for d in delays] for t in FOUND_WITHIN}
-        for limit, masks in found.items():
-            ratios[name, limit] = stacked(100 * mask.sum(axis=1) for mask in masks), n
+        n, found = stacked(d.shape[1] for d in delays), [n_found(d) for d in delays]
+        for limit in found[0]:
+            ratios[name, limit] = stacked(100 * by_limit[limit] for by_limit in found), n
     return ratios
 
 
@@ -161,11 +164,7 @@ def _lowest(ratios: Ratios, choice: ThresholdChoice, draws: Array) -> Integers:
     Returns:
         (n,) indices; the number of thresholds where none fits, or nothing is held.
     """
-    names = (
-        ("raised_quiet", ""),
-        ("false_alarms_per_minute", "quiet"),
-        ("false_alarms_per_minute", "held"),
-    )
+    names = ("raised_quiet", ""), (FALSE_ALARMS, "quiet"), (FALSE_ALARMS, "held")
     drawn = [(draws @ ratios[name][0], (draws @ ratios[name][1])[:, None]) for name in names]
     (raised, quiet), (n_quiet, _), (n, seconds) = drawn
     if choice.counted_in == "quiet":
@@ -212,7 +211,6 @@ def slip_intervals(
     *,
     n: int = N_RESAMPLES,
     seed: int = 0,
-    level: float = 0.95,
 ) -> SlipIntervals | None:
     """Compute the intervals of the pooled metrics of slips.
 
@@ -221,7 +219,6 @@ def slip_intervals(
         indices: (n, n_recordings), or (n, 1), thresholds of each resample.
         n: number of resamples.
         seed: of the resamples.
-        level: fraction of the resamples within each interval.
 
     Returns:
         The intervals; None with fewer than two recordings.
@@ -232,14 +229,8 @@ def slip_intervals(
     chosen, rows = np.broadcast_to(chosen, (n, len(curves))), np.arange(len(curves))
     intervals: dict[str, dict[str, Interval | None]] = {}
     for (name, limit), (parts, wholes) in _ratios(curves).items():
-        found = parts[rows, chosen]
-
-        def rates(draws: Array, found: Array = found, wholes: Array = wholes) -> Array:
-            out, whole = np.full(len(draws), np.nan), draws @ wholes
-            np.divide((draws * found).sum(axis=1), whole, out=out, where=whole > 0)
-            return out
-
-        interval = bootstrap_interval(rates, len(curves), n=n, seed=seed, level=level)
+        statistic = ratio_of_sums(parts[rows, chosen], wholes)
+        interval = bootstrap_interval(statistic, len(curves), n=n, seed=seed)
         intervals.setdefault(name, {})[limit] = interval
     values: dict[str, Any] = {
         name: by_limit.get("", by_limit) for name, by_limit in intervals.items()
@@ -302,23 +293,19 @@ def summarise_choice(
         for recordings in (curves, training)
     )
 
-    def chosen(draws: Array, of_others: Array) -> Integers:
+    def chosen(draw: Callable[[int, int], Array]) -> Integers:
         if not others:
+            draws = draw(len(pooled), seed)
             return held_out_indices(pooled, choice, groups or range(len(pooled)), draws)
-        lowest = _lowest(_ratios(others), choice, of_others)
+        # The other recordings are another sample of the world: their draws have their own seed.
+        lowest = _lowest(_ratios(others), choice, draw(len(others), seed + 1))
         return np.asarray(np.minimum(lowest, len(others[0]) - 1))[:, None]
 
-    (indices,) = chosen(np.ones((1, len(curves))), np.ones((1, len(others))))
+    (indices,) = chosen(lambda n, _: np.ones((1, n)))
     counts = [
         {finger: curve[index] for finger, curve in fingers.items()}
         for fingers, index in zip(curves, np.broadcast_to(indices, len(curves)), strict=True)
     ]
-    # The other recordings are another sample of the world: their draws have their own seed.
-    draws, of_others = (
-        draw_recordings(len(part), N_RESAMPLES, seed + k) if part else np.empty((0, 0))
-        for k, part in enumerate((pooled, others))
-    )
-    intervals = (
-        slip_intervals(pooled, chosen(draws, of_others), seed=seed) if len(pooled) > 1 else None
-    )
+    resampled = chosen(lambda n, seed: draw_recordings(n, N_RESAMPLES, seed))
+    intervals = slip_intervals(pooled, resampled, seed=seed)
     return slip_summary(counts, intervals, threshold_chosen=True)

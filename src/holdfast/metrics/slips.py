@@ -330,17 +330,18 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
     still, sliding = counts.scores
     pairs = float(still.sum()) * float(sliding.sum())
     below = np.cumsum(still) - still / 2
-    before_1mm, before_3mm = (
-        percent(int(n_found), int(n))
-        for n_found, n in zip(counts.found_before, counts.n_reached, strict=True)
-    )
+
+    def found(delays: Array) -> dict[str, float | None]:
+        return {limit: percent(int(n), len(delays)) for limit, n in n_found(delays).items()}
+
+    before_1mm, before_3mm = map(percent, counts.found_before.tolist(), counts.n_reached.tolist())
     return SlipMetrics(
         n=len(counts.delays),
         n_over_1mm=int(over.sum()),
         n_gross=len(counts.gross_delays),
-        incipient=found_shares(counts.delays),
-        gross=found_shares(counts.gross_delays),
-        over_1mm=found_shares(counts.delays[over]),
+        incipient=found(counts.delays),
+        gross=found(counts.gross_delays),
+        over_1mm=found(counts.delays[over]),
         before_1mm=before_1mm,
         before_3mm=before_3mm,
         raised_quiet=percent(counts.raised_seconds, counts.quiet_seconds),
@@ -358,11 +359,12 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
     )
 
 
-def found_shares(delays: Array) -> dict[str, float | None]:
-    """Return the shares of slips found before the onset and within some times after it [%]."""
-    n_before = int((delays < -TIME_TOLERANCE).sum())
-    shares = {"before": percent(n_before, len(delays))}
-    for limit in FOUND_WITHIN:
-        n_found = int((delays <= limit + TIME_TOLERANCE).sum())
-        shares[str(limit)] = percent(n_found, len(delays))
-    return shares
+def n_found(delays: Array) -> dict[str, Count]:
+    """Return the numbers of slips found before the onset and within some times after it.
+
+    Args:
+        delays: (n_slips,) or (n_thresholds, n_slips) [s].
+    """
+    masks = {"before": delays < -TIME_TOLERANCE}
+    masks |= {str(limit): delays <= limit + TIME_TOLERANCE for limit in FOUND_WITHIN}
+    return {limit: mask.sum(axis=-1) for limit, mask in masks.items()}

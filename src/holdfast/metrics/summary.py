@@ -279,7 +279,7 @@ class ResultTotal:
     def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
         """Compute the metrics; the arguments are those of `summarise`."""
         curves = [group.slips.as_curve for group in self.groups] if self.slips else []
-        slips = slip_intervals(curves, n=n_resamples, seed=seed, level=LEVEL)
+        slips = slip_intervals(curves, n=n_resamples, seed=seed)
         return Metrics(
             fingers={
                 name: metrics_of_samples(total.samples) for name, total in self.fingers.items()

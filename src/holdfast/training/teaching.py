@@ -29,7 +29,7 @@ from holdfast.metrics.slip_curves import (
     slip_intervals,
     slip_summary,
 )
-from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
+from holdfast.metrics.slip_truth import slip_truth
 from holdfast.metrics.slips import SlipCounts, count_slips, slip_metrics
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
@@ -397,19 +397,11 @@ def _score_fold(
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        curves = {name: slip_curve(slips) for name, slips in _known_slips(model, recording).items()}
-        counts = {
-            name: count_slips(slips) for name, slips in _known_slips(given, recording).items()
-        }
+        taught, base_slips = (compute_decisions(m, recording).known_slips for m in (model, given))
+        curves = {name: slip_curve(slips) for name, slips in taught.items()}
+        counts = {name: count_slips(slips) for name, slips in base_slips.items()}
         scores.append((curves, counts))
     return scores
-
-
-def _known_slips(model: Model, recording: Recording) -> dict[str, SlipDecisions]:
-    """Return the decisions about each finger whose slips are known; none without a slip rule."""
-    if not model.has_slip_rule:
-        return {}
-    return compute_decisions(model, recording).known_slips
 
 
 def _hand_alarms(curves: Sequence[Mapping[str, SlipCounts]], index: int) -> float:

@@ -534,11 +534,6 @@ class GraspingFinger:
         """Decisions about the finger without debouncing."""
         return self.replay.raw.fingers[self.name]
 
-    @property
-    def seconds(self) -> float:
-        """Held time [s]."""
-        return float(grasped_durations(self.decisions.times)[self.grasped].sum())
-
     def probability(self, head: TunedHead) -> Array:
         """Return the probability of a head in the held samples; none without a slip rule."""
         slip = self.decisions.slip
@@ -581,7 +576,8 @@ class GraspingFingers:
         """Held time of the finger that holds longest [s]."""
         totals: dict[str, float] = {}
         for finger in self.fingers:
-            totals[finger.name] = totals.get(finger.name, 0.0) + finger.seconds
+            held = grasped_durations(finger.decisions.times)[finger.grasped]
+            totals[finger.name] = totals.get(finger.name, 0.0) + float(held.sum())
         return max(totals.values(), default=0.0)
 
     def figures(self, part: FingerModel) -> HandlingFigures:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple, Self
 
 import msgspec
@@ -43,23 +42,23 @@ from holdfast.training.model_fit import (
     fit_model,
     training_record,
 )
+from holdfast.training.parameter_grid import INNER_FOLDS, choose_parameters
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
 from holdfast.training.splits import DataSplit, inner_folds, split_data
 from holdfast.training.thresholds import choose_slip_threshold, with_slip_threshold
 from holdfast.training.training_samples import SamplesPlan, gather_samples
-from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
 
-MAX_SEARCHES = 5
-"""Maximum number of parameter searches for the cross-validation.
+MAX_CHOICES = 5
+"""Maximum number of choices of parameters for the cross-validation.
 
-The parameters with which a unit is evaluated come from a search that leaves the unit out."""
+The parameters with which a unit is evaluated come from a choice that leaves the unit out."""
 
 MAX_FITS = 500
 """Maximum number of models that the cross-validation fits.
 
 Of more recordings (or objects), every 500th is held out together. It is a multiple of
-`MAX_SEARCHES`, so that the search for each of these groups leaves it out."""
+`MAX_CHOICES`, so that the choice for each of these groups leaves it out."""
 
 MAX_UNDECIDED_FRACTION = 0.2
 """Warn when more than this fraction of the labelled samples has no decision."""
@@ -95,7 +94,6 @@ def train(
     recordings: Sequence[Recording],
     setting: Setting | None = None,
     *,
-    journal: Path | None = None,
     warn: Warn = lambda _: None,
     progress: Progress = show_nothing,
     n_jobs: int = 1,
@@ -109,28 +107,26 @@ def train(
     Args:
         recordings: labelled; may be a lazy dataset.
         setting: of the training; by default that of the paper's deployed model.
-        journal: file that keeps the trials of the search, so that it can be resumed.
         warn: is called with the text of every warning.
-        progress: iterates over recordings, searches and fits.
+        progress: iterates over recordings, choices and fits.
         n_jobs: number of processes on this machine; -1 for one per processor.
-        engine: that reads the recordings, searches and fits, instead of `n_jobs` processes. The
+        engine: that reads the recordings, chooses and fits, instead of `n_jobs` processes. The
             result is the same. On a cluster, all machines need the recordings at the same
-            paths, and the journal is not used.
+            paths.
 
     Raises:
         TrainingError: there are no labels, only one class, or too few recordings or objects
             for the split.
         ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
-        OutputError: the journal cannot be written.
         EngineError: the engine cannot be used.
     """
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
-    trainer = _Trainer.read(recordings, setting, journal, warn, progress, engine)
+    trainer = _Trainer.read(recordings, setting, warn, progress, engine)
     trainer.check()
-    # The first search has all samples, and gives the final model its parameters. The others leave
+    # The first choice has all samples, and gives the final model its parameters. The others leave
     # out the units that their parameters are evaluated on.
-    final, *held_out = trainer.search([set(), *trainer.search_units()])
+    final, *held_out = trainer.choose_parameters([set(), *trainer.choice_units()])
     model = fit_full_model(trainer.data, trainer.setting, final)
     scored = trainer.cross_validate(held_out or [final])
     n_undecided = scored.metrics.pooled.n_undecided
@@ -189,16 +185,14 @@ class _Trainer:
         recordings: of the dataset.
         setting: of the training, with what follows from the dataset.
         data: training samples of every head.
-        journal: file that keeps the trials of the search.
         warn: is called with the text of every warning.
-        progress: iterates over recordings, searches and fits.
-        engine: that reads the recordings, searches and fits.
+        progress: iterates over recordings, choices and fits.
+        engine: that reads the recordings, chooses and fits.
     """
 
     recordings: Sequence[Recording]
     setting: Setting
     data: TrainingData
-    journal: Path | None
     warn: Warn
     progress: Progress
     engine: Engine
@@ -208,7 +202,6 @@ class _Trainer:
         cls,
         recordings: Sequence[Recording],
         setting: Setting,
-        journal: Path | None,
         warn: Warn,
         progress: Progress,
         engine: Engine,
@@ -243,9 +236,7 @@ class _Trainer:
         if own and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
         data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
-        # Machines of a cluster share no file to which all may append.
-        journal = journal if engine.scheduler is None else None
-        return cls(recordings, setting, data, journal, warn, progress, engine)
+        return cls(recordings, setting, data, warn, progress, engine)
 
     @property
     def scan(self) -> DatasetScan:
@@ -283,20 +274,22 @@ class _Trainer:
             first = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
             self.warn(f"{finger} has only one class of labels without {first}: not evaluated there")
 
-    def search_units(self) -> list[set[int]]:
-        """Return the units that each search for the cross-validation leaves out."""
+    def choice_units(self) -> list[set[int]]:
+        """Return the units that each choice for the cross-validation leaves out."""
         n_units = len(self.data_split.units)
-        n_searches = min(MAX_SEARCHES, n_units) if self.setting.trials else 0
-        return [set(range(k, n_units, n_searches)) for k in range(n_searches)]
+        n_choices = min(MAX_CHOICES, n_units) if self.setting.trials is None else 0
+        return [set(range(k, n_units, n_choices)) for k in range(n_choices)]
 
-    def search(self, left_out_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
-        """Search the parameters of every finger, once for each collection of held-out units.
+    def choose_parameters(
+        self, left_out_units: Sequence[Collection[int]]
+    ) -> list[dict[str, Parameters]]:
+        """Choose the parameters of every finger, once for each collection of held-out units.
 
-        Without trials, return the reference parameters. A model to adapt has a few candidates
-        instead of a search.
+        With 0 trials, return the reference parameters. A model to adapt has a few candidates
+        instead of a grid.
         """
         setting, init = self.setting, self.setting.init
-        if not setting.trials:
+        if setting.trials is not None:
             reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
             return [reference for _ in left_out_units]
         found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
@@ -310,29 +303,29 @@ class _Trainer:
                         self.warn(adaptation.describe(init.name or "the model to adapt", finger))
             return found
         tasks = (
-            (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger, self.journal)
+            (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger)
             for left_out in left_out_units
             for finger, pool in self.fingers.items()
         )
-        results = self.engine.map_ordered(_search, tasks)
+        results = self.engine.map_ordered(_choose, tasks)
         n_tasks = len(left_out_units) * len(self.fingers)
-        searched = list(self.progress(results, "searching", n_tasks))
-        for warning in dict.fromkeys(warning for _, warning in searched if warning):
+        chosen = list(self.progress(results, "choosing", n_tasks))
+        for warning in dict.fromkeys(warning for _, warning in chosen if warning):
             self.warn(warning)
-        parameters = iter(parameters for parameters, _ in searched)
+        parameters = iter(parameters for parameters, _ in chosen)
         return [{finger: next(parameters) for finger in self.fingers} for _ in left_out_units]
 
-    def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
+    def cross_validate(self, chosen: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
         """Score predictions out of fold.
 
         Args:
-            searched: parameters of every finger from each search. Unit k uses those of search k
-                modulo the number of searches.
+            chosen: parameters of every finger from each choice. Unit k uses those of choice k
+                modulo the number of choices.
         """
         n_units = len(self.data_split.units)
         n_fits = min(n_units, MAX_FITS)
-        n = len(searched)
-        tasks = ((searched[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
+        n = len(chosen)
+        tasks = ((chosen[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
         fits = self.engine.map_ordered(fit_model, tasks, shared=(self.data, self.setting))
         models = list(self.progress(fits, "fitting", n_fits))
         if n_fits < n_units:
@@ -449,22 +442,12 @@ def _score_out_of_fold(
     return score_recording(combined, slip_curves=True), loaded
 
 
-def _search(
-    samples: Samples, setting: Setting, finger: str, journal: Path | None
-) -> tuple[Parameters, str]:
-    """Return the parameters of a finger, and a warning if a search is not possible."""
-    folds = inner_folds(samples, INNER_FOLDS, setting.seed)
-    if len(folds) < 2:
-        return setting.recipe_of(finger).reference, (
-            f"{finger}: {len(folds)} of the folds by recording have both classes, 2 needed to "
-            "search for parameters; the reference parameters are used"
-        )
-    return search(
-        samples,
-        folds,
-        setting.recipe_of(finger),
-        n_trials=setting.trials,
-        seed=setting.seed,
-        objective=setting.search_objective,
-        journal=journal,
-    ), ""
+def _choose(samples: Samples, setting: Setting, finger: str) -> tuple[Parameters, str]:
+    """Return the parameters of a finger, and a warning if they cannot be chosen."""
+    folds, recipe = inner_folds(samples, INNER_FOLDS, setting.seed), setting.recipe_of(finger)
+    if len(folds) >= 2:
+        return choose_parameters(samples, folds, recipe, setting.seed), ""
+    return recipe.reference, (
+        f"{finger}: {len(folds)} of the folds by recording have both classes, 2 needed to choose "
+        "parameters; the reference parameters are used"
+    )

@@ -57,9 +57,12 @@ class TrainingOptions:
         ),
     ] = "recording"
     trials: Annotated[
-        int,
-        typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
-    ] = 30
+        int | None,
+        typer.Option(
+            help="0 uses the reference parameters, instead of the best of a grid.",
+            show_default=False,
+        ),
+    ] = None
     seed: SeedOption = 0
     shared: Annotated[
         bool | None,
