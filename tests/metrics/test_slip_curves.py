@@ -153,9 +153,6 @@ class TestThresholds:
     def test_no_interval_of_one_recording(self):
         assert slip_intervals(self.curves[:1]) is None
 
-    def test_no_summary_without_slips_that_are_known(self):
-        assert slip_summary([{}, {}]) is None
-
 
 def in_use(curve, rate):
     return choose_threshold(curve, ThresholdChoice(rate, "use"))

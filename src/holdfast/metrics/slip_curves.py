@@ -243,8 +243,8 @@ def slip_summary(
     intervals: SlipIntervals | None = None,
     *,
     threshold_chosen: bool = False,
-) -> SlipSummary | None:
-    """Return the metrics of the slips of several recordings; None if their truth is not known.
+) -> SlipSummary:
+    """Return the metrics of the slips of several recordings.
 
     Args:
         recordings: counts of each finger whose slips are known, of each recording.
@@ -252,8 +252,6 @@ def slip_summary(
         threshold_chosen: whether they include the choice of the threshold.
     """
     names = list(dict.fromkeys(name for fingers in recordings for name in fingers))
-    if not names:
-        return None
     by_name = {
         name: SlipCounts.total(fingers[name] for fingers in recordings if name in fingers)
         for name in names
@@ -273,7 +271,7 @@ def summarise_choice(
     groups: Sequence[int] = (),
     training: Sequence[Mapping[str, SlipCounts]] = (),
     seed: int = 0,
-) -> SlipSummary | None:
+) -> SlipSummary:
     """Return the metrics of recordings, each at a threshold that is chosen without it.
 
     Args:
@@ -284,9 +282,6 @@ def summarise_choice(
             recording is one.
         training: curves of other recordings, from which it is chosen instead.
         seed: of the bootstrap, which draws from `training` too.
-
-    Returns:
-        The metrics; None if no slips are known.
     """
     pooled, others = (
         [SlipCounts.total(fingers.values()) for fingers in recordings]

@@ -289,7 +289,7 @@ class ResultTotal:
             events=_event_metrics(self.events, self.hands, list(self.fingers)),
             intervals=self._intervals(n_resamples, seed),
             score_bins=N_BINS if self.binned else None,
-            slips=slip_summary([self.slips], slips),
+            slips=slip_summary([self.slips], slips) if self.slips else None,
         )
 
     def _intervals(self, n: int, seed: int) -> Intervals | None:

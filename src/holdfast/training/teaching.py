@@ -236,18 +236,16 @@ def teach_with_report(
     pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
     total = SlipCounts.total(pooled)
     index = choose_threshold(total, ThresholdChoice(false_alarms, "use"))
-    slips = None
-    if index is not None:
-        slips = slip_summary(
-            [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
-            slip_intervals([curve[index].as_curve for curve in pooled], seed=seed),
-        )
-    if index is None or slips is None:
+    if index is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
             f"{total.held_seconds / 60:.2g} min of held time; more grasps expected in which "
             "nothing slides, with pushes and taps"
         )
+    slips = slip_summary(
+        [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
+        slip_intervals([curve[index].as_curve for curve in pooled], seed=seed),
+    )
     head = _fitted(samples, ())
     shown = range(max(index - N_SHOWN, 0), min(index + N_SHOWN + 1, len(total)))
     points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), total[k]) for k in shown]

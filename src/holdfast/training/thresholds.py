@@ -12,6 +12,7 @@ takes the one with the fewest missed events among all that are quiet enough.
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import takewhile
 from typing import Any, Literal, NamedTuple, Self
 
@@ -61,8 +62,6 @@ STABLE_SHARE = 0.95
 """Share of the held samples of own handling that is STABLE."""
 RAISED_SHARE = 0.05
 """Share of the held samples of own handling in which a slip may be reported."""
-WORSE = 0.5
-"""Change of a share of the held samples from which a calibration made it worse [% points]."""
 MAX_DISTANCE = 3.0
 """A threshold is at most this many scales of the log odds from their location: what is further
 away is taken for slip, and the share is not reached then."""
@@ -136,6 +135,8 @@ class CurvePoint(msgspec.Struct, frozen=True):
         in_time: the time of `missed` that the record of a choice has.
         n: number of events: onsets of instability of the hand, or slips of the fingers.
         minutes: duration of the time that counts [min]: labelled stable, or held by a finger.
+        is_usable: whether it may be chosen, whatever its false alarms: the hand is STABLE often
+            enough, but not for ever; a slip is reported in at most 2 % of quiet hold.
         events: all metrics of the hand; None for slips.
         stable: share of the samples labelled STABLE that are decided STABLE [%]; None for slips.
         slips: all metrics of slips; None for stability.
@@ -147,13 +148,21 @@ class CurvePoint(msgspec.Struct, frozen=True):
     in_time: str
     n: int
     minutes: float
+    is_usable: bool
     events: EventMetrics | None = None
     stable: float | None = None
     slips: SlipMetrics | None = None
 
     @classmethod
-    def of_hands(cls, threshold: float, hands: Sequence[FingerDecisions]) -> Self:
+    def of_hands(
+        cls, threshold: float, hands: Sequence[FingerDecisions], most: float = 0.0
+    ) -> Self:
         """Return the point of the events of the hand, missed without an alarm in 0.2 s.
+
+        Args:
+            threshold: of the probability.
+            hands: decisions about each recording.
+            most: share of the samples labelled STABLE that are so at the lowest threshold [%].
 
         Raises:
             TrainingError: nothing is labelled, or not as stable.
@@ -164,16 +173,18 @@ class CurvePoint(msgspec.Struct, frozen=True):
                 f"none of the recordings ({len(hands)}) has labels; labels expected"
             )
         events = pool_events([match_decisions(hand) for hand in labelled])
-        stable = np.concatenate([hand.states[hand.labels == STABLE] == STABLE for hand in labelled])
-        if not events.stable_minutes or not len(stable):
+        states = np.concatenate([hand.states[hand.labels == STABLE] for hand in labelled])
+        if not events.stable_minutes or not len(states):
             raise TrainingError(
                 "no time in which the hand is labelled stable; false alarms are counted per "
                 "minute of it"
             )
+        stable = 100 * int((states == STABLE).sum()) / len(states)
+        # Below the hysteresis a stable contact stays stable, so that every event is missed.
+        is_usable = stable >= USABLE_SHARE * most and (events.missed["0.2"] or 0.0) < 100
         return cls(
             threshold, events.false_alarms_per_minute or 0.0, events.missed, "0.2",
-            events.n_events, events.stable_minutes, events=events,
-            stable=100 * int(stable.sum()) / len(stable),
+            events.n_events, events.stable_minutes, is_usable, events=events, stable=stable,
         )  # fmt: skip
 
     @classmethod
@@ -183,7 +194,8 @@ class CurvePoint(msgspec.Struct, frozen=True):
         missed = {t: None if found is None else 100 - found for t, found in slips.incipient.items()}
         return cls(
             threshold, slips.false_alarms_per_minute["held"] or 0.0, missed, "0.1",
-            slips.n, slips.held_minutes, slips=slips,
+            slips.n, slips.held_minutes, (slips.raised_quiet or 0.0) <= MAX_RAISED_QUIET,
+            slips=slips,
         )  # fmt: skip
 
     @property
@@ -231,19 +243,17 @@ class Curve:
     Attributes:
         thresholds: from the quietest to the most sensitive.
         at: returns the point of a threshold.
-        is_usable: whether a point may be chosen, whatever its false alarms.
     """
 
     thresholds: Sequence[float]
     at: Callable[[float], CurvePoint]
-    is_usable: Callable[[CurvePoint], bool]
 
     @classmethod
     def of_stability(cls, model: Model, recordings: Iterable[Recording]) -> Self:
         """Return the curve of the onsets of instability of the hand.
 
         The decision rule is replayed at each threshold, with contact, hysteresis, hold and minimum
-        duration. Points are usable at which the hand is STABLE often enough, but not for ever.
+        duration.
 
         Raises:
             TrainingError: nothing is labelled, or not as stable.
@@ -251,8 +261,9 @@ class Curve:
         """
         replays = [ThresholdReplay.of(model, recording) for recording in recordings]
 
-        def at(threshold: float) -> CurvePoint:
-            return CurvePoint.of_hands(threshold, [replay.hand(threshold) for replay in replays])
+        def at(threshold: float, most: float = 0.0) -> CurvePoint:
+            hands = [replay.hand(threshold) for replay in replays]
+            return CurvePoint.of_hands(threshold, hands, most)
 
         most = at(float(THRESHOLDS[0])).stable or 0.0
         if most == 0:
@@ -261,17 +272,11 @@ class Curve:
                 "labelled stable (see holdfast detect --summary)"
             )
 
-        def is_usable(point: CurvePoint) -> bool:
-            # Below the hysteresis a stable contact stays stable, so that every event is missed.
-            return (point.stable or 0.0) >= USABLE_SHARE * most and (point.missed["0.2"] or 0) < 100
-
-        return cls(THRESHOLDS.tolist(), at, is_usable)
+        return cls(THRESHOLDS.tolist(), partial(at, most=most))
 
     @classmethod
     def of_slips(cls, model: Model, recordings: Iterable[Recording]) -> Self:
         """Return the curve of the slips of all fingers.
-
-        Points are usable at which a slip is reported in at most 2 % of quiet hold.
 
         Raises:
             ModelError: the model has no slip rule.
@@ -292,11 +297,7 @@ class Curve:
             counts = [counter.count(slip.raised_at(only))[0] for slip, counter in counters]
             return CurvePoint.of_slips(threshold, SlipCounts.total(counts))
 
-        def is_usable(point: CurvePoint) -> bool:
-            raised = None if point.slips is None else point.slips.raised_quiet
-            return (raised or 0.0) <= MAX_RAISED_QUIET
-
-        return cls(SLIP_THRESHOLDS[::-1].tolist(), at, is_usable)
+        return cls(SLIP_THRESHOLDS[::-1].tolist(), at)
 
     def choose(self, false_alarms: float) -> tuple[CurvePoint, list[CurvePoint]]:
         """Return the best point with few enough false alarms, and all usable points in order.
@@ -315,13 +316,11 @@ class Curve:
         best = best_of(points)
         if best.false_alarms > false_alarms:
             missed = best.missed[best.in_time]
-            misses = "has no event to miss"
-            if missed is not None:
-                misses = f"misses {missed:.0f} % of {best.n} within {best.in_time} s"
+            misses = f"misses {missed or 0:.0f} % of {best.n} within {best.in_time} s"
             raise TrainingError(
                 f"no threshold gives at most {false_alarms:g} false alarms a minute on these "
                 f"recordings; the least is {best.false_alarms:.2g} at the threshold "
-                f"{best.threshold:.3g}, which {misses}"
+                f"{best.threshold:.3g}, which {misses if best.n else 'has no event to miss'}"
             )
         # All neighbours up to the next threshold that was looked at on either side.
         index = self.thresholds.index(best.threshold)
@@ -331,7 +330,7 @@ class Curve:
 
     def _usable(self, thresholds: Sequence[float]) -> list[CurvePoint]:
         points = [self.at(threshold) for threshold in thresholds]
-        return [point for point in points if self.is_usable(point)] or points
+        return [point for point in points if point.is_usable] or points
 
 
 @dataclass(frozen=True)
@@ -486,35 +485,6 @@ def with_slip_threshold(model: Model, point: CurvePoint | None) -> Model:
     return model.with_threshold("slip", point.threshold, point.choice(SLIP_FALSE_ALARMS))
 
 
-class HandlingFigures(msgspec.Struct, frozen=True):
-    """Decisions of a model about own handling.
-
-    Attributes:
-        threshold: of the probability of stability.
-        stable: share of the held samples that are STABLE [%].
-        alarms_per_minute: alarms of all fingers per minute of held time.
-        slip_threshold: of the probability of a slip; None without a slip rule.
-        raised: share of the held samples in which a slip is reported [%]; None without one.
-    """
-
-    threshold: float
-    stable: float
-    alarms_per_minute: float
-    slip_threshold: float | None = None
-    raised: float | None = None
-
-    def worse_than(self, other: "HandlingFigures") -> bool:
-        """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
-
-        An alarm begins and ends with STABLE, so more of them are no worse where more samples are
-        STABLE: a finger that is never STABLE has no alarm.
-        """
-        stable = self.stable - other.stable
-        raised = (self.raised or 0.0) - (other.raised or 0.0)
-        more_alarms = self.alarms_per_minute > other.alarms_per_minute
-        return stable < -WORSE or raised > WORSE or (stable <= 0 and more_alarms)
-
-
 @dataclass(frozen=True, eq=False)
 class GraspingFinger:
     """One finger of one recording of own handling, decided with any threshold.
@@ -579,18 +549,6 @@ class GraspingFingers:
             held = grasped_durations(finger.decisions.times)[finger.grasped]
             totals[finger.name] = totals.get(finger.name, 0.0) + float(held.sum())
         return max(totals.values(), default=0.0)
-
-    def figures(self, part: FingerModel) -> HandlingFigures:
-        """Return the figures at the thresholds of a model, which made the decisions."""
-        stable = part.stable.threshold
-        slip = None if part.slip is None else part.slip.threshold
-        return HandlingFigures(
-            threshold=stable,
-            stable=100 * self.share("stable", stable),
-            alarms_per_minute=self.alarms_per_minute("stable", stable),
-            slip_threshold=slip,
-            raised=None if slip is None else 100 * self.share("slip", slip),
-        )
 
     def share(self, head: TunedHead, threshold: float) -> float:
         """Return the share of the held samples that are STABLE, or in which a slip is reported."""

@@ -25,7 +25,6 @@ from holdfast.training.adaptation import (
 )
 from holdfast.training.classifiers.fitting import Parameters, Samples
 from holdfast.training.dataset_scan import (
-    DatasetScan,
     OneRecording,
     Progress,
     RecordingScan,
@@ -34,7 +33,7 @@ from holdfast.training.dataset_scan import (
     show_nothing,
 )
 from holdfast.training.evaluation import combine_decisions, judge
-from holdfast.training.finger_samples import FingerSamples, thin, thinning_step
+from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.head_fits import missing_heads
 from holdfast.training.model_fit import (
     TrainingData,
@@ -146,7 +145,7 @@ def train(
     # The figures in the file are those after the choice of the threshold: slips are among them.
     provenance = training_record(
         trainer.setting,
-        trainer.scan,
+        trainer.data.scan,
         final,
         metrics.pooled,
         trainer.data.thinned,
@@ -158,7 +157,7 @@ def train(
     )
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
-    known = () if init is None else tuple(known_recordings(init, trainer.scan))
+    known = () if init is None else tuple(known_recordings(init, trainer.data.scan))
     tares = LoadedTares(scored.n_loaded, len(recordings))
     return Trained(model, metrics, trainer.setting.split, tares, known)
 
@@ -238,21 +237,6 @@ class _Trainer:
         data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
         return cls(recordings, setting, data, warn, progress, engine)
 
-    @property
-    def scan(self) -> DatasetScan:
-        """What was read of the recordings."""
-        return self.data.scan
-
-    @property
-    def data_split(self) -> DataSplit:
-        """Units that are held out together."""
-        return self.data.data_split
-
-    @property
-    def fingers(self) -> Mapping[str, FingerSamples]:
-        """Training samples of the heads of stability."""
-        return self.data.fingers
-
     def check(self) -> None:
         """Check the samples, and warn of metrics that are missing or may be wrong.
 
@@ -262,13 +246,13 @@ class _Trainer:
         """
         self.data.check_classes()
         for finger, (n_used, n) in self.data.thinned.items():
-            step = thinning_step(self.scan.n_labelled, self.setting.max_samples)
+            step = thinning_step(self.data.scan.n_labelled, self.setting.max_samples)
             self.warn(
                 f"{finger}: fitted to {n_used} of {n} labelled samples, one of {step} "
                 "(--max-samples); the metrics are on all of them"
             )
-        if self.setting.init is not None:
-            for warning in adaptation_warnings(self.setting.init, self.scan, self.fingers):
+        if (init := self.setting.init) is not None:
+            for warning in adaptation_warnings(init, self.data.scan, self.data.fingers):
                 self.warn(warning)
         for finger, names in self.data.units_without_model().items():
             first = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
@@ -276,7 +260,7 @@ class _Trainer:
 
     def choice_units(self) -> list[set[int]]:
         """Return the units that each choice for the cross-validation leaves out."""
-        n_units = len(self.data_split.units)
+        n_units = len(self.data.data_split.units)
         n_choices = min(MAX_CHOICES, n_units) if self.setting.trials is None else 0
         return [set(range(k, n_units, n_choices)) for k in range(n_choices)]
 
@@ -288,14 +272,14 @@ class _Trainer:
         With 0 trials, return the reference parameters. A model to adapt has a few candidates
         instead of a grid.
         """
-        setting, init = self.setting, self.setting.init
+        setting, init, fingers = self.setting, self.setting.init, self.data.fingers
         if setting.trials is not None:
-            reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
+            reference = {finger: setting.recipe_of(finger).reference for finger in fingers}
             return [reference for _ in left_out_units]
         found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
         if init is not None:
             for left_out, parameters_of in zip(left_out_units, found, strict=True):
-                for finger, pool in self.fingers.items():
+                for finger, pool in fingers.items():
                     prior = init.finger(finger).stable.rule
                     adaptation = choose_adaptation(pool, prior, left_out)
                     parameters_of[finger] = adaptation.parameters
@@ -305,15 +289,15 @@ class _Trainer:
         tasks = (
             (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger)
             for left_out in left_out_units
-            for finger, pool in self.fingers.items()
+            for finger, pool in fingers.items()
         )
         results = self.engine.map_ordered(_choose, tasks)
-        n_tasks = len(left_out_units) * len(self.fingers)
+        n_tasks = len(left_out_units) * len(fingers)
         chosen = list(self.progress(results, "choosing", n_tasks))
         for warning in dict.fromkeys(warning for _, warning in chosen if warning):
             self.warn(warning)
         parameters = iter(parameters for parameters, _ in chosen)
-        return [{finger: next(parameters) for finger in self.fingers} for _ in left_out_units]
+        return [{finger: next(parameters) for finger in fingers} for _ in left_out_units]
 
     def cross_validate(self, chosen: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
         """Score predictions out of fold.
@@ -322,28 +306,26 @@ class _Trainer:
             chosen: parameters of every finger from each choice. Unit k uses those of choice k
                 modulo the number of choices.
         """
-        n_units = len(self.data_split.units)
+        n_units = len(self.data.data_split.units)
         n_fits = min(n_units, MAX_FITS)
         n = len(chosen)
         tasks = ((chosen[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
         fits = self.engine.map_ordered(fit_model, tasks, shared=(self.data, self.setting))
         models = list(self.progress(fits, "fitting", n_fits))
         if n_fits < n_units:
-            self.warn(
-                f"{n_units} {self.data_split.split}s are held out in {n_fits} groups, not alone"
-            )
+            self.warn(f"{n_units} {self.setting.split}s are held out in {n_fits} groups, not alone")
 
         def calls() -> Iterator[tuple[int, str, Sequence[Recording], list[Model | None]]]:
-            by_samples = self.data_split.split in ("time", "random")
-            for index, scanned in enumerate(self.scan.recordings):
+            by_samples = self.data.data_split.split in ("time", "random")
+            for index, scanned in enumerate(self.data.scan.recordings):
                 # A recording is scored by the one model that was fitted without it; if samples
                 # are held out, by each model on its samples; without labels, by none.
                 used = models if scanned.n_labelled else []
                 if used and not by_samples:
-                    used = [models[self.data_split.group_of[index] % len(models)]]
+                    used = [models[self.data.data_split.group_of[index] % len(models)]]
                 yield index, scanned.name, OneRecording(self.recordings, index), used
 
-        context = (self.data_split, len(self.fingers))
+        context = (self.data.data_split, len(self.data.fingers))
         evaluated = self.engine.map_ordered(_score_out_of_fold, calls(), shared=context)
         total, slip_curves, n_loaded = ResultTotal(), [], 0
         for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
@@ -368,7 +350,7 @@ class _Trainer:
             return replace_fields(model, fingers=fingers), metrics
         if not model.has_slip_rule:
             return with_slip_threshold(model, None), replace_fields(metrics, slips=None)
-        groups = self.data_split.group_of.tolist()
+        groups = self.data.data_split.group_of.tolist()
         chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
         if chosen.point is None:
             self.warn(f"{chosen.reason}; the model gets no slip rule")
