@@ -177,8 +177,8 @@ def _lowest(ratios: Ratios, choice: ThresholdChoice, draws: Array) -> Integers:
         seconds = np.where(is_excess, quiet * disturbed, seconds)
     # Without held time the rate is not known, so no threshold fits; without quiet hold nothing can
     # be raised in it.
-    fits = (n <= choice.false_alarms * seconds) & (seconds > 0)
-    fits &= raised <= MAX_RAISED_QUIET * quiet
+    few = (n <= choice.false_alarms * seconds) & (seconds > 0)
+    fits = few & (raised <= MAX_RAISED_QUIET * quiet)
     unbroken = np.logical_and.accumulate(fits[:, ::-1], axis=1)  # from the highest on
     return np.asarray(fits.shape[1] - unbroken.sum(axis=1))
 

@@ -58,10 +58,7 @@ class TrainingOptions:
     ] = "recording"
     trials: Annotated[
         int | None,
-        typer.Option(
-            help="0 uses the reference parameters, instead of the best of a grid.",
-            show_default=False,
-        ),
+        typer.Option(help="0 uses the reference parameters, not the best of a grid."),
     ] = None
     seed: SeedOption = 0
     shared: Annotated[
