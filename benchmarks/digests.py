@@ -40,7 +40,7 @@ SIMULATIONS = {
 }
 TRAININGS = {
     "logreg": "main --trials 0",
-    "searched": "main --trials 3",
+    "searched": "main",
     "svm": "main --classifier svm --trials 0",
     "holdfast": "main --features holdfast --trials 0",
     "any": "hands --features any --trials 0",

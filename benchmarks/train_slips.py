@@ -35,16 +35,17 @@ from holdfast.detection import FeatureSpec, Head, Linear, Model, Tare
 from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
-from holdfast.metrics.slips import SlipCurve, SlipMetrics, slip_metrics
+from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
+from holdfast.metrics.slips import SlipCounts, SlipMetrics, slip_metrics
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.head_fits import fit_slip, fit_speed
 from holdfast.training.setting import Setting
-from holdfast.training.slip_threshold import choose_slip_threshold, with_slip_threshold
 from holdfast.training.splits import split_data
 from holdfast.training.targets import TargetSamples
+from holdfast.training.thresholds import choose_slip_threshold, with_slip_threshold
 from holdfast.training.training_samples import SamplesPlan, gather_samples
 
 N_FOLDS = 5
@@ -77,13 +78,14 @@ def main(options: argparse.Namespace) -> None:
     calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
     chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
-    if chosen is None or chosen.index is None:
-        raise SystemExit(chosen.reason if chosen else "no slips are known")
+    if chosen.point is None:
+        raise SystemExit(chosen.reason)
+    index = SLIP_THRESHOLDS.tolist().index(chosen.point.threshold)
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
-        print_folder(folder.name, recordings, curves, chosen.index)
+        print_folder(folder.name, recordings, curves, index)
     complete = replaced(model, fitted(model, samples, speeds, [], features, squares))
-    complete = with_slip_threshold(complete, chosen)
+    complete = with_slip_threshold(complete, chosen.point)
     print(msgspec.json.encode(complete.finger("*").slip.choice).decode())
     if complete.finger("*").normalised:
         # A model of any hand finds few slips of a hand outside its generator (docs/study/slips.md):
@@ -190,20 +192,20 @@ def replaced(model: Model, heads: Sequence[Head]) -> Model:
 def print_folder(
     folder: str,
     recordings: Sequence[Recording],
-    curves: Sequence[Mapping[str, SlipCurve]],
-    place: int,
+    curves: Sequence[Mapping[str, SlipCounts]],
+    index: int,
 ) -> None:
     """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
     own = [
-        SlipCurve.total(list(fingers.values()))
+        SlipCounts.total(fingers.values())
         for item, fingers in zip(recordings, curves, strict=True)
         if fingers and item.name.startswith(f"{folder}/")
     ]
     print(folder)
-    print_metrics(slip_metrics(SlipCurve.total(own)[place]))
+    print_metrics(slip_metrics(SlipCounts.total(own)[index]))
 
 
-def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCurve]:
+def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCounts]:
     return score_recording(compute_decisions(model, recording), slip_curves=True).slip_curves
 
 

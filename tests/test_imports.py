@@ -7,7 +7,7 @@ import pytest
 
 DETECTING = ("holdfast.detection", "holdfast.live.stream_detector")
 OF_EXTRAS = (
-    "jinja2", "joblib", "matplotlib", "mujoco", "optuna", "pyarrow", "scipy", "sklearn",
+    "jinja2", "joblib", "matplotlib", "mujoco", "pyarrow", "scipy", "sklearn",
 )  # fmt: skip
 PROGRAM = """
 import sys

@@ -23,7 +23,7 @@ from holdfast.removed import removal
 EXTRA_MODULES = {
     "parquet": ("pyarrow",),
     "pandas": ("pandas",),
-    "train": ("sklearn", "scipy", "optuna", "joblib", "threadpoolctl"),
+    "train": ("sklearn", "scipy", "joblib", "threadpoolctl"),
     "twin": ("mujoco", "scipy", "PIL", "joblib"),
     "plot": ("matplotlib",),
     "label": ("scipy",),

@@ -72,14 +72,8 @@ def test_train_and_evaluate(capsys, cluster, folder):
     there = run(capsys, *words, "-o", "there.json", "--engine", f"dask:{cluster}")
     assert (folder / "there.json").read_bytes() == (folder / "alone.json").read_bytes()
     assert there["cross_validation"] == alone["cross_validation"]
-    assert not (folder / "there.json.search").exists()
     words = ("evaluate", "there.json", "data")
     assert run(capsys, *words, "--engine", f"dask:{cluster}") == run(capsys, *words)
-
-
-def test_a_search_on_a_cluster_is_not_resumed(capsys, cluster):
-    words = ("train", "data", "-o", "model.json", "--resume", "--engine", f"dask:{cluster}")
-    assert "--engine loky" in Verb().refusal(capsys, *words)
 
 
 def test_no_scheduler_at_the_address(capsys, monkeypatch, folder):

@@ -131,9 +131,9 @@ MESSAGES = [
     ("train data -o new.json --classifier magic", "'magic'", "logreg", "svm"),
     ("train data -o new.json --hold=-1", "hold", "-1"),
     ("train data -o new.json --init builtin:twin --window 14", "--init", "leave out --window"),
-    ("train data -o new.json --resume", "new.json.search", "nothing to resume"),
-    ("train data -o half.json", "half.json.search", "--resume", "--force"),
-    ("train data -o new.json --for slip --trials 3", "--for slip", "leave the others out"),
+    ("train data -o new.json --trials 5", "5 trials given", "grid", "holdfast study"),
+    ("train data -o new.json --resume", "--resume", "grid", "holdfast study"),
+    ("train data -o new.json --for slip --trials 0", "--for slip", "leave the others out"),
     ("evaluate builtin:any gone", "gone"),
     ("evaluate builtin:any bare", "bare", "labels expected"),
     ("evaluate builtin:any data --plot x.txt", "x.txt", ".png"),
@@ -218,7 +218,7 @@ def folder(tmp_path_factory):
     (folder / "nothing").mkdir()
     for name in ("json", "svg", "pdf", "mcap"):
         (folder / f"kept.{name}").write_text("mine")
-    for name in ("kept", "data/a.csv", "half.json.search"):
+    for name in ("kept", "data/a.csv"):
         (folder / name).write_text("mine")
     taxels = ",".join(f"F{axis}{taxel}" for taxel in range(9) for axis in "xyz")
     press = "".join(f"{10 * k},{','.join(map(str, range(k, k + 27)))}\n" for k in range(30))

@@ -15,7 +15,6 @@ OTHER_MEANING = {
     "--model": "the detector of trials, and a model whose decisions a figure shows",
     "--rate": "of a sensor, and of a source against its model",
     "--seconds": "record until it is stopped, and a minute of handling",
-    "--resume": "a search of train, and the protocol of teach",
     "--sensor": "of a CSV file, and of the fingers of an exported model",
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",

@@ -9,50 +9,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.metrics.slip_thresholds import (
-    SLIP_THRESHOLDS,
-    ThresholdChoice,
-    choose_threshold,
-    held_out_places,
-    slip_curve,
-    slip_intervals,
-    slip_summary,
-    summarise_choice,
-)
+from holdfast.metrics.slip_curves import slip_curve
 from holdfast.metrics.slip_truth import (
     CREEPING,
     NOT_HELD,
     SLIDING,
     STILL,
-    Slip,
     SlipDecisions,
-    SlipTruth,
     truth_impacts,
 )
-from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
+from holdfast.metrics.slips import SlipCounts, count_slips, slip_metrics
 from holdfast.recordings import Truth
 
-RATE = 100.0
-
-
-def decisions(raised, slips=(), *, seconds=10.0, codes=None, quiet=None, probability=None):
-    """Return decisions that are raised in some intervals [s]."""
-    n = round(seconds * RATE)
-    times = np.arange(n) / RATE
-    mask = np.zeros(n, dtype=bool)
-    for start, end in raised:
-        mask[round(start * RATE) : round(end * RATE)] = True
-    if codes is None:
-        codes = np.full(n, STILL, dtype=np.int8)
-        for slip in slips:
-            codes[round(slip.onset * RATE) : round(slip.end * RATE)] = SLIDING
-    truth = SlipTruth(codes, codes == STILL if quiet is None else quiet, tuple(slips), "truth")
-    values = np.where(mask, 0.9, 0.1) if probability is None else probability
-    return SlipDecisions(times, values, mask, 0.0, truth)
-
-
-def slip(onset=5.0, end=6.0, gross=math.nan, reached=(math.nan, math.nan)):
-    return Slip(onset, end, gross, 5e-4 if math.isnan(reached[0]) else 2e-3, reached)
+from .slips import RATE, decisions, slip
 
 
 class TestFound:
@@ -221,7 +190,7 @@ class TestImpacts:
     def test_at_many_thresholds_and_in_sums(self):
         given = decisions([(3.05, 3.2)], [slip()])
         given = replace(given, truth=replace(given.truth, impacts=((3.0, 3.1),)))
-        curve = SlipCurve.total([slip_curve(given)] * 2)
+        curve = SlipCounts.total([slip_curve(given)] * 2)
         assert curve.false_impacts[0] == curve.false_impacts[100] == curve[0].false_impacts == 2
         assert curve.false_impacts[-1] == 0
         assert SlipCounts.total([curve[0], curve[-1]]).n_impacts == 4
@@ -280,126 +249,3 @@ class TestRaised:
         times = np.arange(3) / RATE
         made = SlipDecisions(times, np.full(3, np.nan), times > 0, 1.0, None)
         assert not made.raised_at(np.array([0.5])).any()
-
-
-def random_recording(seed, n_false):
-    """Return decisions with random probabilities: high in a slip and in some still samples."""
-    generator = np.random.default_rng(seed)
-    made = decisions([], [slip()], seconds=20)
-    probability = generator.uniform(0.0, 0.3, len(made.times))
-    probability[500:600] = generator.uniform(0.6, 0.95)
-    for start in generator.integers(700, 1900, n_false):
-        probability[start] = generator.uniform(0.5, 0.9)
-    return SlipDecisions(made.times, probability, made.raised, 0.0, made.truth)
-
-
-class TestThresholds:
-    curves = tuple(slip_curve(random_recording(seed, seed % 4)) for seed in range(8))
-
-    def test_the_lowest_that_fits_is_chosen(self):
-        total = SlipCurve.total(self.curves)
-        place = choose_threshold(total, 1.0)
-        rates = [60 * counts.false_held / counts.held_seconds for counts in total]
-        assert rates[place] <= 1.0
-        assert rates[place - 1] > 1.0
-        assert all(rate <= 1.0 for rate in rates[place:])
-
-    def test_false_alarms_are_counted_in_held_time_or_in_quiet_hold_alone(self):
-        total = SlipCurve.total(self.curves)
-        pushed = replace(total, false_held=total.false_held + 99)
-        assert choose_threshold(pushed, 1.0) is None
-        place = choose_threshold(pushed, 1.0, "quiet")
-        rates = [60 * counts.false_quiet / counts.quiet_seconds for counts in total]
-        raised = [counts.raised_seconds / counts.quiet_seconds for counts in total]
-        assert rates[place] <= 1.0
-        assert rates[place - 1] > 1.0 or raised[place - 1] > 0.02
-
-    def test_a_summary_has_the_threshold_of_other_recordings_or_of_other_groups(self):
-        tested, training = (
-            [{"thumb": c} for c in part] for part in (self.curves[:4], self.curves[4:])
-        )
-        for choice in (ThresholdChoice(1.0), ThresholdChoice(-1.0)):  # the second allows nothing
-            place = choose_threshold(SlipCurve.total(self.curves[4:]), choice.false_alarms)
-            summary = summarise_choice(tested, choice, training=training)
-            assert summary.threshold_chosen and summary.intervals is not None
-            counts = SlipCurve.total(self.curves[:4])[-1 if place is None else place]
-            assert summary.pooled == summary.fingers["thumb"] == slip_metrics(counts)
-        groups = [0, 0, 1, 1]
-        places = held_out_places(self.curves[:4], groups, ThresholdChoice(1.0))
-        counts = SlipCounts.total(c[k] for c, k in zip(self.curves, places, strict=False))
-        summary = summarise_choice(tested, ThresholdChoice(1.0), groups=groups)
-        assert summary.pooled == slip_metrics(counts)
-
-    def test_a_curve_is_the_counts_at_each_threshold(self):
-        slips = [slip(), slip(8.0, 8.3, gross=8.1, reached=(8.05, math.nan))]
-        made = replace(
-            decisions([], slips, seconds=20),
-            probability=random_recording(5, 9).probability,
-            hold=0.2,
-        )
-        for place in (40, 60, 80, 90):
-            (raised,) = made.raised_at(SLIP_THRESHOLDS[[place]])
-            expected = vars(count_slips(replace(made, raised=raised)))
-            counts = vars(slip_curve(made)[place])
-            assert raised.any()
-            assert {name: np.asarray(value).tolist() for name, value in counts.items()} == {
-                name: np.asarray(value).tolist() for name, value in expected.items()
-            }
-
-    def test_none_if_no_threshold_fits(self):
-        probability = np.ones(1000)
-        made = SlipDecisions(
-            np.arange(1000) / RATE, probability, probability > 0, 0.0, decisions([]).truth
-        )
-        assert choose_threshold(slip_curve(made), 1.0) is None
-
-    def test_a_recording_is_scored_by_the_threshold_of_the_others(self):
-        places = held_out_places(self.curves, list(range(8)), ThresholdChoice(1.0))
-        for own, place in enumerate(places):
-            others = [curve for k, curve in enumerate(self.curves) if k != own]
-            total = SlipCurve.total(others)
-            assert place == choose_threshold(total, 1.0)
-
-    @pytest.mark.parametrize("groups", [range(8), (0, 0, 1, 1, 2, 2, 3, 3)])
-    def test_intervals_with_the_choice_are_of_recordings_left_out(self, groups):
-        choice = ThresholdChoice(1.0)
-        places = held_out_places(self.curves, groups, choice)
-        scored = [curve[place] for curve, place in zip(self.curves, places, strict=True)]
-        point = slip_metrics(SlipCounts.total(scored))
-        held_out = slip_intervals(self.curves, choice, groups=groups, n=200)
-        low, high = held_out.false_alarms_per_minute["held"]
-        assert low <= point.false_alarms_per_minute["held"] <= high
-        assert high > 1.0  # the rate that was asked for holds in sample only
-        low, high = held_out.incipient["0.1"]
-        assert low <= point.incipient["0.1"] <= high
-
-    def test_a_single_group_gets_the_highest_threshold(self):
-        places = held_out_places(self.curves[:2], (0, 0), ThresholdChoice(1.0))
-        assert places.tolist() == [len(SLIP_THRESHOLDS) - 1] * 2
-
-    def test_no_threshold_where_nothing_is_held(self):
-        codes = np.full(1000, NOT_HELD, dtype=np.int8)
-        assert choose_threshold(slip_curve(decisions([], codes=codes)), 1.0) is None
-
-    def test_intervals_without_a_choice_are_those_of_the_threshold(self):
-        single = [SlipCurve.of_one(curve[60]) for curve in self.curves]
-        found = slip_intervals(single, n=200)
-        summary = slip_summary([{"thumb": curve[0]} for curve in single], found)
-        low, high = found.incipient["0.1"]
-        assert low <= summary.pooled.incipient["0.1"] <= high
-        assert summary.intervals == found
-
-    def test_intervals_at_the_threshold_of_training_recordings(self):
-        """Equal training recordings give the same threshold in every resample."""
-        choice, tested = ThresholdChoice(1.0), self.curves[:4]
-        place = choose_threshold(self.curves[5], 1.0)
-        found = slip_intervals(tested, choice, training=[self.curves[5]] * 3, n=200)
-        assert found == slip_intervals([SlipCurve.of_one(curve[place]) for curve in tested], n=200)
-        varied = slip_intervals(tested, choice, training=self.curves[4:], n=200)
-        assert varied != found
-
-    def test_no_interval_of_one_recording(self):
-        assert slip_intervals(self.curves[:1]) is None
-
-    def test_no_summary_without_slips_that_are_known(self):
-        assert slip_summary([{}, {}]) is None

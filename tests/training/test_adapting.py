@@ -74,7 +74,7 @@ def test_recordings_correct_a_wrong_model(known, few):
     moved = with_rule(part, intercepts=(intercept + 4.0,))
     wrong = msgspec.structs.replace(known, fingers={ANY_FINGER: moved}, debounce=Debounce())
     rest = [tiny_recording(seed) for seed in range(60, 64)]
-    adapted = train(few, Setting.adapting(wrong, trials=5)).model
+    adapted = train(few, Setting.adapting(wrong)).model
     assert accuracy(adapted, rest) > accuracy(wrong, rest) + 5.0
 
 
@@ -99,7 +99,7 @@ def test_one_recording_is_split_by_time(known, few):
 
 
 def test_what_was_taken_is_reported_for_every_finger(known, few):
-    _, messages = train_with_warnings(few, Setting.adapting(known, trials=1))
+    _, messages = train_with_warnings(few, Setting.adapting(known))
     assert len(messages) == 2
     for message, finger in zip(messages, ("thumb", "index"), strict=True):
         assert f"mine for {finger}" in message
@@ -165,4 +165,4 @@ def test_fingers_with_different_features(known):
 def test_a_finger_that_the_model_lacks(known):
     own = [tiny_recording(seed, ("thumb", "ring")) for seed in (50, 51)]
     with pytest.raises(ModelError, match="'ring'"):
-        train(own, Setting.adapting(by_finger(known), trials=3))
+        train(own, Setting.adapting(by_finger(known)))

@@ -12,10 +12,14 @@ from holdfast.detection import Handling, Model, detect
 from holdfast.errors import ModelError, TrainingError
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import calibrate, calibrate_with_report
-from holdfast.training.calibration import CALIBRATED_SUFFIX, activity, n_changed
-from holdfast.training.operating_point import HandlingFigures
+from holdfast.training.calibration import (
+    CALIBRATED_SUFFIX,
+    HandlingFigures,
+    activity,
+    n_changed,
+)
 from holdfast.training.own_handling import MIN_SCALE, grasped_samples
-from holdfast.training.tune import tune
+from holdfast.training.thresholds import tune
 from training.build import (
     PAD,
     handling_module,

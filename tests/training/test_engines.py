@@ -76,7 +76,7 @@ def test_samples_do_not_depend_on_the_engine(folder, cluster, max_samples):
 
 @pytest.mark.parametrize("split", ["recording", "random"])
 def test_a_cluster_gives_the_same_model_and_metrics(folder, cluster, split, tmp_path):
-    setting = Setting(trials=2, split=split, max_samples=500)
+    setting = Setting(split=split, max_samples=500)
     warned, warned_there = [], []
     alone = train(load_dataset(folder), setting, warn=warned.append)
     there = train(load_dataset(folder), setting, warn=warned_there.append, engine=cluster)

@@ -10,7 +10,7 @@ from holdfast.detection import ANY_FINGER, Head, fingertip_force, haar_features,
 from holdfast.recordings import Label
 from holdfast.training import Setting, calibrate, train
 from holdfast.training.head_fits import CAUSE_PENALTY, fit_causes
-from holdfast.training.tune import tune
+from holdfast.training.thresholds import tune
 
 from .build import TINY, handling_recording, normalised_model, sliding_recording, tiny_recording
 

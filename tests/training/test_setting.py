@@ -11,7 +11,7 @@ def test_the_defaults_are_those_of_the_deployed_model():
         "F_a", "F_x", "F_y", "F_z", "sigma[14]"
     ]  # fmt: skip
     assert (setting.classifier, setting.window, str(setting.used_tare)) == ("logreg", 14, "0.5")
-    assert (setting.split, setting.trials) == ("recording", 30)
+    assert (setting.split, setting.trials) == ("recording", None)
     assert (setting.debounce, setting.rate) == (Debounce(), None)
 
 
@@ -21,8 +21,9 @@ def test_the_defaults_are_those_of_the_deployed_model():
         ({"classifier": "magic"}, "'magic'; there are logreg, svm"),
         ({"window": 13}, "13 given"),
         ({"split": "half"}, "'half'; there are recording, object, time, random"),
-        ({"trials": -1}, "-1 and"),
-        ({"max_samples": 0}, "and 0 given"),
+        ({"trials": -1}, "-1 trials given"),
+        ({"trials": 5}, "5 trials given.*grid.*holdfast study"),
+        ({"max_samples": 0}, "0 given"),
         ({"seed": -1}, "seed"),
         ({"contact_threshold": -1.0}, "contact threshold"),
         ({"contact_threshold": float("nan")}, "contact threshold"),
@@ -44,14 +45,3 @@ def test_features_of_the_slip_rule():
     assert relative[: len(ANY_FEATURES)] == ANY_FEATURES
     added = relative[len(ANY_FEATURES) :]
     assert added == tuple(spec for spec in SLIP_FEATURES if spec.seconds)
-
-
-@pytest.mark.parametrize(
-    ("given", "objective"),
-    [
-        ({}, "log_loss"),
-        ({"classifier": "svm"}, "error"),
-    ],
-)
-def test_the_objective_of_the_search(given, objective):
-    assert Setting(**given).search_objective == objective

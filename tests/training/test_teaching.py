@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import msgspec
-import numpy as np
 import pytest
 
 from holdfast import teach
@@ -12,8 +11,6 @@ from holdfast.detection import Model
 from holdfast.detection.specs import TAUGHT_FEATURES
 from holdfast.errors import TrainingError
 from holdfast.io import load_dataset, save_recording
-from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, choose_threshold, weighted_threshold
-from holdfast.metrics.slips import SlipCounts, SlipCurve
 from holdfast.parallel import Engine
 from holdfast.recordings import Label
 from holdfast.training import evaluate, teach_with_report, teaching
@@ -201,51 +198,6 @@ def test_a_rate_that_is_not_above_0_is_refused(rate, recordings):
 
 
 def test_no_threshold_is_quiet_enough(recordings, monkeypatch):
-    monkeypatch.setattr(teaching, "weighted_threshold", lambda curve, false_alarms: None)
+    monkeypatch.setattr(teaching, "choose_threshold", lambda curve, choice: None)
     with pytest.raises(TrainingError, match=r"0.01 false alarms"):
         teach(BASE, recordings, false_alarms=0.01)
-
-
-class TestWeightedThreshold:
-    @staticmethod
-    def curve(quiet, disturbed, quiet_minutes=6.0, disturbed_minutes=4.0):
-        """Return counts whose false alarms fall by a half from threshold to threshold."""
-        n = len(SLIP_THRESHOLDS)
-        minutes = quiet_minutes + disturbed_minutes
-        silent = replace(
-            SlipCounts.total([]), quiet_seconds=60 * quiet_minutes, held_seconds=60 * minutes
-        )
-        falls = 0.5 ** np.arange(n)
-        return SlipCurve(
-            silent, np.empty((n, 0)), np.empty((n, 0)), np.zeros((n, 2)),
-            false_quiet=quiet * falls, false_held=(quiet + disturbed) * falls,
-            raised_seconds=np.zeros(n), false_impacts=np.zeros(n, dtype=np.int64),
-        )  # fmt: skip
-
-    def test_disturbed_time_counts_with_its_own_share_below_that_of_use(self):
-        # 9 + 3 false alarms in 8 minutes.
-        curve = self.curve(9.0, 3.0, 6.0, 2.0)
-        assert weighted_threshold(curve, 1.5) == choose_threshold(curve, 1.5) == 0
-        assert weighted_threshold(curve, 1.4) == choose_threshold(curve, 1.4) == 1
-
-    def test_disturbed_time_counts_with_the_share_of_use_above_it(self):
-        # 0.6 * 2 / 2 + 0.4 * 16 / 8 = 1.4 a minute; all held time has 1.8.
-        curve = self.curve(2.0, 16.0, 2.0, 8.0)
-        assert weighted_threshold(curve, 1.4) == 0
-        assert weighted_threshold(curve, 1.3) == choose_threshold(curve, 1.3) == 1
-        assert weighted_threshold(curve, 0.6) == 2
-
-    @pytest.mark.parametrize("minutes", [(10.0, 0.0), (0.0, 10.0)])
-    def test_only_one_of_the_two_counts_alone(self, minutes):
-        curve = self.curve(20.0 * (minutes[0] > 0), 20.0 * (minutes[1] > 0), *minutes)
-        assert weighted_threshold(curve, 2.0) == 0
-        assert weighted_threshold(curve, 1.9) == 1
-
-    def test_what_is_raised_in_quiet_hold_stays_under_two_percent(self):
-        curve = self.curve(0.0, 0.0)
-        raised = np.where(np.arange(len(curve)) < 5, 7.3, 7.1)  # of 360 s
-        assert weighted_threshold(replace(curve, raised_seconds=raised), 1.0) == 5
-
-    def test_none_fits(self):
-        assert weighted_threshold(self.curve(6.0, 8.0), 1e-80) is None
-        assert weighted_threshold(self.curve(0.0, 0.0, 0.0, 0.0), 1.0) is None

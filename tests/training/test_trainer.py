@@ -11,7 +11,8 @@ from holdfast.errors import TrainingError
 from holdfast.metrics import summarise
 from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions, train, trainer
-from holdfast.training.classifiers import Fitted, Samples, recipe
+from holdfast.training.classifiers import recipe
+from holdfast.training.classifiers.fitting import Fitted, Samples
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import fit_model
 from holdfast.training.splits import split_data
@@ -21,7 +22,7 @@ from .build import TINY, tiny_module, tiny_recording
 pytestmark = pytest.mark.slow
 
 SETTING = Setting(window=6, features=parse_features("F_a,F_x,sigma", 6), trials=0)
-QUICK = replace(SETTING, trials=3)
+GRID = replace(SETTING, trials=None)
 ONE_CLASS = (ContactState.NO_CONTACT, None, ContactState.UNSTABLE, None)
 
 
@@ -48,7 +49,7 @@ def fitted_by(recordings, setting, monkeypatch, **options):
 
 @pytest.mark.parametrize("split", ["recording", "object"])
 def test_no_model_is_evaluated_on_its_training_samples(grasps, split, monkeypatch):
-    setting = replace(QUICK, split=split)
+    setting = replace(GRID, split=split)
     data_split = split_data(scan_dataset(grasps).recordings, split, 0)
     found = fitted_by(grasps, setting, monkeypatch)
     every = set(range(len(data_split.units)))
@@ -58,29 +59,29 @@ def test_no_model_is_evaluated_on_its_training_samples(grasps, split, monkeypatc
 
 
 @pytest.mark.parametrize("split", ["recording", "object"])
-def test_no_search_uses_the_units_that_are_evaluated(grasps, split, monkeypatch):
-    """Parameters of a unit's model come from a search without that unit."""
-    searched, evaluated = {}, {}
+def test_no_choice_uses_the_units_that_are_evaluated(grasps, split, monkeypatch):
+    """Parameters of a unit's model come from a choice without that unit."""
+    chosen, evaluated = {}, {}
 
-    def spy_search(samples, setting, finger, journal):
-        token = float(len(searched) + 1)
-        searched[token] = set(samples.groups.tolist())
+    def spy_choose(samples, setting, finger):
+        token = float(len(chosen) + 1)
+        chosen[token] = set(samples.groups.tolist())
         return {"C": token, "class_weight": None}, ""
 
     def spy_fit(data, setting, parameters, held):
         evaluated[min(held)] = [given["C"] for given in parameters.values()]
         return fit_model(data, setting, parameters, held)
 
-    monkeypatch.setattr(trainer, "_search", spy_search)
+    monkeypatch.setattr(trainer, "_choose", spy_choose)
     monkeypatch.setattr(trainer, "fit_model", spy_fit)
-    train(grasps, replace(QUICK, split=split))
+    train(grasps, replace(GRID, split=split))
     n_units = 6 if split == "recording" else 3
-    n_searches = min(5, n_units)
-    assert len(searched) == 2 * (1 + n_searches)  # two fingers, and once for the model itself
+    n_choices = min(5, n_units)
+    assert len(chosen) == 2 * (1 + n_choices)  # two fingers, and once for the model itself
     assert set(evaluated) == set(range(n_units))
     for unit, tokens in evaluated.items():
         for token in tokens:
-            assert unit not in searched[token]
+            assert unit not in chosen[token]
 
 
 def test_cross_validation_equals_separate_trainings(grasps):
@@ -135,7 +136,7 @@ def test_a_random_sample_is_evaluated_by_the_model_without_it(grasps, monkeypatc
 
 
 def test_the_model_has_its_provenance(grasps):
-    trained = train(grasps, QUICK)
+    trained = train(grasps, GRID)
     provenance = trained.model.training
     assert provenance.recordings == {each.name: each.readings_digest for each in grasps}
     assert (provenance.split, provenance.seed) == ("recording", 0)
@@ -148,34 +149,14 @@ def test_the_model_has_its_provenance(grasps):
 
 def test_the_same_seed_gives_the_same_model(grasps):
     given = grasps[:3]
-    assert train(given, QUICK) == train(given, QUICK)
+    assert train(given, GRID) == train(given, GRID)
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_parallel_training_gives_the_same_model(grasps, split, tmp_path):
-    setting, given = replace(QUICK, split=split), grasps[:3]
-    alone = train(given, setting, journal=tmp_path / "alone")
-    assert train(given, setting, journal=tmp_path / "together", n_jobs=2) == alone
-
-
-def test_a_stopped_training_ends_where_it_would_have_ended(grasps, tmp_path, monkeypatch):
-    whole = train(grasps, QUICK, journal=tmp_path / "whole")
-    n_fits = []
-    fit = type(recipe("logreg")).fit
-
-    def stops(self, samples, parameters, seed):
-        n_fits.append(1)
-        if len(n_fits) == 70:
-            raise KeyboardInterrupt
-        return fit(self, samples, parameters, seed)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(type(recipe("logreg")), "fit", stops)
-        with pytest.raises(KeyboardInterrupt):
-            train(grasps, QUICK, journal=tmp_path / "stopped")
-    kept = (tmp_path / "stopped").read_bytes()
-    assert train(grasps, QUICK, journal=tmp_path / "stopped") == whole
-    assert (tmp_path / "stopped").read_bytes().startswith(kept)
+def test_parallel_training_gives_the_same_model(grasps, split):
+    setting, given = replace(GRID, split=split), grasps[:3]
+    alone = train(given, setting)
+    assert train(given, setting, n_jobs=2) == alone
 
 
 @pytest.mark.parametrize(
@@ -218,15 +199,14 @@ def test_the_contact_threshold_of_a_fold_leaves_out_its_recordings(grasps):
 def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
     warnings = []
     given = [tiny_recording(seed, ("thumb",)) for seed in range(2)]
-    trained = train(given, QUICK, warn=warnings.append)
+    trained = train(given, GRID, warn=warnings.append)
     # Two recordings make two folds for the model itself, but one for each of the figures.
     assert len(warnings) == 1 and warnings[0].startswith("thumb: 0 of the folds")
     assert trained.cross_validation.pooled.n == 2 * 345
-    found, warning = trainer._search(
+    found, warning = trainer._choose(
         Samples(np.zeros((4, 1)), np.array([0, 1, 0, 1], bool), np.zeros(4, int)),
-        QUICK,
+        GRID,
         "thumb",
-        None,
     )
     assert found == recipe("logreg").reference
     assert warning == warnings[0]
@@ -296,11 +276,11 @@ def test_long_steps_report_progress(grasps):
         steps.append((what, total))
         return iter(items)
 
-    train(grasps, QUICK, progress=progress)
+    train(grasps, GRID, progress=progress)
     assert steps == [
         ("reading", 6),
         ("features", 6),
-        ("searching", 12),
+        ("choosing", 12),
         ("fitting", 6),
         ("evaluating", 6),
     ]

@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import Decisions, FingerDecisions, summarise
-from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+from holdfast.metrics.slip_curves import SlipIntervals, SlipSummary
 from holdfast.metrics.slips import SlipMetrics
 from holdfast.training.verdict import Bounded, LoadedTares, verdict
 

@@ -1,7 +1,7 @@
 """Threshold on one feature."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -15,10 +15,6 @@ from holdfast.training.classifiers.fitting import (
     sigmoid,
     standardise,
 )
-
-if TYPE_CHECKING:
-    from optuna import Trial
-
 
 Side = Literal["below", "above", "either"]
 """Side of the cut on which contacts are stable; `either` is decided by the fit."""
@@ -49,18 +45,11 @@ class Threshold:
     Attributes:
         side: side of the cut on which contacts are stable. A slip rule with an upper threshold
             has `below`.
-        name: of the recipe.
         reference: reference parameters: none.
     """
 
     side: Side = "either"
-    name: str = "threshold"
     reference: Parameters = field(default_factory=dict)
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Return no parameters; there are none to search."""
-        del trial
-        return {}
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples. The fit is deterministic; the seed is not used.

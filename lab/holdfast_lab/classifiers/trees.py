@@ -2,7 +2,7 @@
 
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,11 +14,7 @@ from holdfast.training.classifiers.fitting import (
     Samples,
     check_classes,
     class_ratio,
-    undo_balancing,
 )
-
-if TYPE_CHECKING:
-    from optuna import Trial
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +51,7 @@ class Trees:
         if known.any():
             with _one_thread():
                 balanced = self.estimator.predict_proba(rows[known])[:, 1]
-            probabilities[known] = undo_balancing(balanced, self.class_ratio)
+            probabilities[known] = balanced / (balanced + self.class_ratio * (1.0 - balanced))
         return probabilities
 
 
@@ -67,7 +63,6 @@ class GradientBoosting:
     is corrected by it; the decision is not changed by the correction.
     """
 
-    name: str = "trees"
     reference: Parameters = field(
         default_factory=lambda: {
             "n_trees": 150,
@@ -76,15 +71,6 @@ class GradientBoosting:
             "leaf_samples": 50,
         }
     )
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw the number and size of the trees, and the weight of each."""
-        return {
-            "n_trees": trial.suggest_int("n_trees", 50, 400, log=True),
-            "learning_rate": trial.suggest_float("learning_rate", 0.02, 0.3, log=True),
-            "n_leaves": trial.suggest_int("n_leaves", 4, 63, log=True),
-            "leaf_samples": trial.suggest_int("leaf_samples", 10, 500, log=True),
-        }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Trees:
         """Fit the trees to the samples.

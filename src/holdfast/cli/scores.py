@@ -13,7 +13,7 @@ from holdfast.cli.terminal.console import (
 
 if TYPE_CHECKING:
     from holdfast.metrics import EventMetrics, Intervals, Metrics, SampleMetrics
-    from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+    from holdfast.metrics.slip_curves import SlipIntervals, SlipSummary
     from holdfast.metrics.slips import SlipMetrics
     from holdfast.training import CurvePoint
     from holdfast.training.evaluation import Evaluation
@@ -243,15 +243,13 @@ def print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> Non
         return
     print_line("of the hand; missed events within 0.05, 0.1 and 0.2 s of their onset")
     rows = []
-    for point in points:
-        cells: tuple[str, ...] = ()
-        if (events := point.events) is not None:
-            missed = (format_number(share, 1) for share in events.missed.values())
-            never = events.delay_median is None and events.n_events
-            delay = "never" if never else format_number(events.delay_median, 3)
-            rates = f"{point.stable:.1f}", f"{point.false_alarms:.2f}"
-            cells = f"{point.threshold:.4g}", *rates, *missed, delay
-        rows.append((*cells, notes.get(point.threshold, "")))
+    for point, events in ((point, point.events) for point in points if point.events is not None):
+        missed = (format_number(share, 1) for share in events.missed.values())
+        never = events.delay_median is None and events.n_events
+        delay = "never" if never else format_number(events.delay_median, 3)
+        rates = f"{point.stable:.1f}", f"{point.false_alarms:.2f}"
+        note = notes.get(point.threshold, "")
+        rows.append((f"{point.threshold:.4g}", *rates, *missed, delay, note))
     header = ("threshold", "STABLE %", "false/min", "0.05 s %", "0.1 s %", "0.2 s %",
               "delay s", "")  # fmt: skip
     print_table(header, rows)

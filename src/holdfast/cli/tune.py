@@ -1,8 +1,7 @@
 """`holdfast tune`: a model with the threshold for a wanted rate of false alarms."""
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -29,13 +28,6 @@ if TYPE_CHECKING:
     from holdfast.recordings import Recording
 
 
-class TunedQuestion(StrEnum):
-    """Question whose threshold is chosen."""
-
-    STABLE = "stable"
-    SLIP = "slip"
-
-
 def tune(
     model: ModelArgument,
     data: Annotated[Path, typer.Argument(help="A labelled recording, or a folder of them.")],
@@ -50,9 +42,9 @@ def tune(
         ),
     ],
     question: Annotated[
-        TunedQuestion,
+        Literal["stable", "slip"],
         typer.Option("--for", help="Threshold to choose: that of STABLE, or that of a slip."),
-    ] = TunedQuestion.STABLE,
+    ] = "stable",
     force: ForceOption = False,
     start: StartOptions,
     as_json: JsonOption = False,
@@ -89,7 +81,7 @@ def tune(
     def deciding(items: "Iterable[Recording]") -> "Iterator[Recording]":
         return progress(items, "deciding", n)
 
-    tuned = choose(loaded, recordings, false_alarms, question.value, progress=deciding)
+    tuned = choose(loaded, recordings, false_alarms, question, progress=deciding)
     # The verdict is on the copy, with its new threshold.
     evaluation = evaluate_recordings(tuned.model, recordings, progress=progress)
     warn_about_recordings(evaluation, n)

@@ -57,7 +57,7 @@ def replay(
     out: npt.NDArray[np.int8],
     /,
 ) -> None:
-    """Fill (n,) states of a finger from its probability of stability; see `training.replay`."""
+    """Fill (n,) states of a finger from its probability of stability; see `training.thresholds`."""
 
 class Stream:
     """The feature stream of a hand; see `holdfast.h`. It cannot be copied or pickled.

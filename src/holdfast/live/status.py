@@ -4,6 +4,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 
+import msgspec
 import numpy as np
 
 from holdfast.contact import ContactState, Fault, HandEstimate
@@ -190,11 +191,7 @@ def operating_points(model: Model) -> list[schema.OperatingPoint]:
     """Return the errors at each threshold that was tried when the model was tuned."""
     choices = [part.stable.choice for part in model.fingers.values()]
     return [
-        schema.OperatingPoint(
-            threshold=point.threshold,
-            false_alarms_per_minute=point.false_alarms_per_minute,
-            missed=point.missed,
-        )
+        schema.OperatingPoint(**msgspec.structs.asdict(point))
         for choice in choices[:1]  # all fingers are tuned together
         if choice is not None
         for point in choice.points

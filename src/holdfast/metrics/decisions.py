@@ -85,6 +85,12 @@ class Decisions:
         """Return the decisions of a recording; those of the hand follow from the fingers."""
         return cls(name, fingers, hand_decisions(fingers, n_model_fingers))
 
+    @property
+    def known_slips(self) -> dict[str, SlipDecisions]:
+        """Decisions about the slips of each finger whose slips are known."""
+        slips = {name: finger.slip for name, finger in self.fingers.items()}
+        return {name: slip for name, slip in slips.items() if slip and slip.truth}
+
 
 def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int) -> FingerDecisions:
     """Return the labels and states of a hand, at every time of any finger.

@@ -1,9 +1,8 @@
 """Score of decisions about slips, by the truth: found in time, found early, false alarms."""
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Self
+from typing import Any, Self
 
 import msgspec
 import numpy as np
@@ -36,9 +35,16 @@ FOUND_WITHIN = (0.03, 0.05, 0.1)
 """Times after the onset within which the slips are counted that are found [s]."""
 
 
+Count = Any
+"""A number; of counts at several thresholds, (n_thresholds,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class SlipCounts:
     """Counts of the slips and alarms of one finger in one or more recordings.
+
+    They are of one threshold, or of several, the lowest first: then the fields of `BY_THRESHOLD`
+    have a first axis (n_thresholds,).
 
     Attributes:
         delays: (n_slips,) first alarm of each slip minus its onset [s]; infinite without one.
@@ -63,114 +69,60 @@ class SlipCounts:
     distances: Array
     found_before: Integers
     n_reached: Integers
-    false_quiet: int
-    false_held: int
+    false_quiet: Count
+    false_held: Count
     quiet_seconds: float
     held_seconds: float
-    raised_seconds: float
+    raised_seconds: Count
     scores: Integers
     onsets: frozenset[Onsets]
     n_impacts: int = 0
-    false_impacts: int = 0
+    false_impacts: Count = 0
 
     @classmethod
     def total(cls, parts: Iterable[Self]) -> Self:
-        """Return the counts of all parts together."""
-        every = list(parts)
+        """Return the counts of all parts together; without parts, of one threshold."""
         none, zeros = np.empty(0), np.zeros(len(DISTANCES), dtype=np.int64)
-        return cls(
-            np.concatenate([none, *(part.delays for part in every)]),
-            np.concatenate([none, *(part.gross_delays for part in every)]),
-            np.concatenate([none, *(part.distances for part in every)]),
-            sum((part.found_before for part in every), zeros),
-            sum((part.n_reached for part in every), zeros),
-            sum(part.false_quiet for part in every),
-            sum(part.false_held for part in every),
-            sum(part.quiet_seconds for part in every),
-            sum(part.held_seconds for part in every),
-            sum(part.raised_seconds for part in every),
-            sum((part.scores for part in every), np.zeros((2, N_BINS), dtype=np.int64)),
-            frozenset[Onsets]().union(*(part.onsets for part in every)),
-            sum(part.n_impacts for part in every),
-            sum(part.false_impacts for part in every),
-        )
+        scores = np.zeros((2, N_BINS), dtype=np.int64)
+        empty = cls(none, none, none, zeros, zeros, 0, 0, 0.0, 0.0, 0.0, scores, frozenset())
+        every = list(parts) or [empty]
+        by_name: dict[str, Any] = {
+            item.name: [getattr(part, item.name) for part in every] for item in fields(cls)
+        }
+        joined: dict[str, Any] = {
+            name: np.concatenate(by_name.pop(name), axis=-1) for name in PER_SLIP
+        }
+        onsets = frozenset[Onsets]().union(*by_name.pop("onsets"))
+        return cls(**joined, onsets=onsets, **{name: sum(by_name[name]) for name in by_name})
 
     @property
     def is_over_1mm(self) -> Mask:
         """(n_slips,) True for the slips that slid over 1 mm."""
         return np.asarray(self.distances > DISTANCES[0])
 
-
-@dataclass(frozen=True, eq=False)
-class SlipCurve:
-    """Counts of the slips and alarms at several thresholds, lowest first.
-
-    Attributes:
-        silent: counts without an alarm, with what does not depend on the threshold.
-        delays: (n_thresholds, n_slips) as in `SlipCounts`, like all the following [s].
-        gross_delays: (n_thresholds, n_gross) [s].
-        found_before: (n_thresholds, n_distances).
-        false_quiet: (n_thresholds,).
-        false_held: (n_thresholds,).
-        raised_seconds: (n_thresholds,) [s].
-        false_impacts: (n_thresholds,).
-    """
-
-    silent: SlipCounts
-    delays: Array
-    gross_delays: Array
-    found_before: Integers
-    false_quiet: Integers
-    false_held: Integers
-    raised_seconds: Array
-    false_impacts: Integers
-
-    @classmethod
-    def of_one(cls, counts: SlipCounts) -> Self:
-        """Return the counts of one threshold."""
-        return cls(counts, *(np.array(getattr(counts, name))[None] for name in _BY_THRESHOLD))
-
-    @classmethod
-    def joined(cls, parts: Sequence[Self]) -> Self:
-        """Return the counts at the thresholds of all parts, one after the other."""
-        arrays = ([getattr(part, name) for part in parts] for name in _BY_THRESHOLD)
-        return cls(parts[0].silent, *map(np.concatenate, arrays))
-
-    @classmethod
-    def total(cls, curves: Sequence[Self]) -> Self:
-        """Return the counts of all curves together, at each threshold; without curves, at none."""
-        if not curves:
-            none = cls.of_one(SlipCounts.total([]))
-            return cls(none.silent, *(getattr(none, name)[:0] for name in _BY_THRESHOLD))
-        return cls(
-            SlipCounts.total(curve.silent for curve in curves),
-            np.hstack([curve.delays for curve in curves]),
-            np.hstack([curve.gross_delays for curve in curves]),
-            np.sum([curve.found_before for curve in curves], axis=0),
-            np.sum([curve.false_quiet for curve in curves], axis=0),
-            np.sum([curve.false_held for curve in curves], axis=0),
-            np.sum([curve.raised_seconds for curve in curves], axis=0),
-            np.sum([curve.false_impacts for curve in curves], axis=0),
-        )
-
     def __len__(self) -> int:
+        """Return the number of thresholds of counts of several."""
         return len(self.delays)
 
-    def __getitem__(self, index: int) -> SlipCounts:
-        """Return the counts at one threshold."""
-        return replace(
-            self.silent,
-            delays=self.delays[index],
-            gross_delays=self.gross_delays[index],
-            found_before=self.found_before[index],
-            false_quiet=int(self.false_quiet[index]),
-            false_held=int(self.false_held[index]),
-            raised_seconds=float(self.raised_seconds[index]),
-            false_impacts=int(self.false_impacts[index]),
-        )
+    def __getitem__(self, index: int) -> Self:
+        """Return the counts of one of several thresholds."""
+        taken = {name: getattr(self, name)[index] for name in BY_THRESHOLD}
+        return replace(self, **{k: v if v.ndim else v.item() for k, v in taken.items()})
+
+    @property
+    def as_curve(self) -> Self:
+        """Counts of one threshold as a curve of one."""
+        values: dict[str, Any] = {name: np.array(getattr(self, name)) for name in BY_THRESHOLD}
+        return replace(self, **{name: value[None] for name, value in values.items()})
 
 
-_BY_THRESHOLD = tuple(each.name for each in fields(SlipCurve) if each.name != "silent")
+PER_SLIP = ("delays", "gross_delays", "distances")
+"""Fields of `SlipCounts` whose last axis are slips."""
+BY_THRESHOLD = (
+    "delays", "gross_delays", "found_before", "false_quiet", "false_held", "raised_seconds",
+    "false_impacts",
+)  # fmt: skip
+"""Fields of `SlipCounts` that depend on the threshold."""
 
 
 def count_slips(decisions: SlipDecisions) -> SlipCounts:
@@ -211,7 +163,7 @@ class SlipCounter:
             follows them.
         quiet: (n + 1,) duration of quiet hold outside the slips before each sample [s].
         outside: (n + 1,) the same of all held time outside the slips.
-        silent: counts without an alarm.
+        known: fields of the counts that do not depend on the threshold.
     """
 
     times: Array
@@ -221,7 +173,7 @@ class SlipCounter:
     impacts: Integers
     quiet: Array
     outside: Array
-    silent: SlipCounts
+    known: dict[str, Any]
 
     @classmethod
     def of(cls, decisions: SlipDecisions) -> Self:
@@ -255,32 +207,26 @@ class SlipCounter:
         first, last = impacts.T
         impacts = impacts[(wrong[last] == wrong[first]) & (last > first)]
 
-        known = ~np.isnan(decisions.probability)
+        decided = ~np.isnan(decisions.probability)
         histograms = [
             np.bincount(
-                bins_of(decisions.probability[known & (truth.codes == code)]), minlength=N_BINS
+                bins_of(decisions.probability[decided & (truth.codes == code)]), minlength=N_BINS
             )
             for code in (STILL, SLIDING)
         ]
-        silent = SlipCounts(
-            delays=np.full(len(slips), np.inf),
-            gross_delays=np.full(sum(not math.isnan(slip.gross) for slip in slips), np.inf),
-            distances=np.array([slip.distance for slip in slips]),
-            found_before=np.zeros(len(DISTANCES), dtype=np.int64),
-            n_reached=(~np.isnan(reached)).sum(axis=0),
-            false_quiet=0,
-            false_held=0,
-            quiet_seconds=float(steps[quiet].sum()),
-            held_seconds=float(steps[counted].sum()),
-            raised_seconds=0.0,
-            scores=np.array(histograms),
-            onsets=frozenset({truth.onsets}),
-            n_impacts=len(impacts),
-        )
+        known = {
+            "distances": np.array([slip.distance for slip in slips]),
+            "n_reached": (~np.isnan(reached)).sum(axis=0),
+            "quiet_seconds": float(steps[quiet].sum()),
+            "held_seconds": float(steps[counted].sum()),
+            "scores": np.array(histograms),
+            "onsets": frozenset({truth.onsets}),
+            "n_impacts": len(impacts),
+        }
         spent = elapsed(quiet), elapsed(counted)
-        return cls(times, windows, away, reached, impacts, *spent, silent)
+        return cls(times, windows, away, reached, impacts, *spent, known)
 
-    def count(self, raised: Mask) -> SlipCurve:
+    def count(self, raised: Mask) -> SlipCounts:
         """Return the counts at several thresholds.
 
         Args:
@@ -307,8 +253,8 @@ class SlipCounter:
         n_alarmed = np.zeros(len(raised), dtype=np.int64)
         for begin, end in self.impacts:
             n_alarmed += raised[:, begin:end].any(axis=1)
-        return SlipCurve(
-            self.silent,
+        return SlipCounts(
+            **self.known,
             delays=first - onset,
             gross_delays=(first - gross)[:, ~np.isnan(gross)],
             found_before=(first[:, :, None] <= self.reached + TIME_TOLERANCE).sum(axis=1),
@@ -384,17 +330,18 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
     still, sliding = counts.scores
     pairs = float(still.sum()) * float(sliding.sum())
     below = np.cumsum(still) - still / 2
-    before_1mm, before_3mm = (
-        percent(int(n_found), int(n))
-        for n_found, n in zip(counts.found_before, counts.n_reached, strict=True)
-    )
+
+    def found(delays: Array) -> dict[str, float | None]:
+        return {limit: percent(int(n), len(delays)) for limit, n in n_found(delays).items()}
+
+    before_1mm, before_3mm = map(percent, counts.found_before.tolist(), counts.n_reached.tolist())
     return SlipMetrics(
         n=len(counts.delays),
         n_over_1mm=int(over.sum()),
         n_gross=len(counts.gross_delays),
-        incipient=found_shares(counts.delays),
-        gross=found_shares(counts.gross_delays),
-        over_1mm=found_shares(counts.delays[over]),
+        incipient=found(counts.delays),
+        gross=found(counts.gross_delays),
+        over_1mm=found(counts.delays[over]),
         before_1mm=before_1mm,
         before_3mm=before_3mm,
         raised_quiet=percent(counts.raised_seconds, counts.quiet_seconds),
@@ -412,11 +359,12 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
     )
 
 
-def found_shares(delays: Array) -> dict[str, float | None]:
-    """Return the shares of slips found before the onset and within some times after it [%]."""
-    n_before = int((delays < -TIME_TOLERANCE).sum())
-    shares = {"before": percent(n_before, len(delays))}
-    for limit in FOUND_WITHIN:
-        n_found = int((delays <= limit + TIME_TOLERANCE).sum())
-        shares[str(limit)] = percent(n_found, len(delays))
-    return shares
+def n_found(delays: Array) -> dict[str, Count]:
+    """Return the numbers of slips found before the onset and within some times after it.
+
+    Args:
+        delays: (n_slips,) or (n_thresholds, n_slips) [s].
+    """
+    masks = {"before": delays < -TIME_TOLERANCE}
+    masks |= {str(limit): delays <= limit + TIME_TOLERANCE for limit in FOUND_WITHIN}
+    return {limit: mask.sum(axis=-1) for limit, mask in masks.items()}

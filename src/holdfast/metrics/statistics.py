@@ -131,10 +131,12 @@ def ratio_of_sums(parts: npt.ArrayLike, wholes: npt.ArrayLike) -> Statistic:
     """Return the statistic sum(parts) / sum(wholes); with wholes of 1, the mean of the parts.
 
     Args:
-        parts: (n_recordings,).
+        parts: (n_recordings,); or (n, n_recordings), others in each resample.
         wholes: (n_recordings,).
     """
     part, whole = np.asarray(parts, dtype=np.float64), np.asarray(wholes, dtype=np.float64)
+    if part.ndim == 2:
+        return lambda draws: _divide((draws * part).sum(axis=1), draws @ whole)
     return lambda draws: _divide(draws @ part, draws @ whole)
 
 

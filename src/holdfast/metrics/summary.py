@@ -24,13 +24,13 @@ from holdfast.metrics.samples import (
     metrics_of_samples,
     score_samples,
 )
-from holdfast.metrics.slip_thresholds import (
+from holdfast.metrics.slip_curves import (
     SlipSummary,
     slip_curve,
     slip_intervals,
     slip_summary,
 )
-from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips
+from holdfast.metrics.slips import SlipCounts, count_slips
 from holdfast.metrics.statistics import (
     Interval,
     Statistic,
@@ -155,7 +155,7 @@ class RecordingResults:
     events: Mapping[str, EventCounts]
     hand: EventCounts | None
     slips: Mapping[str, SlipCounts] = field(default_factory=dict)
-    slip_curves: Mapping[str, SlipCurve] = field(default_factory=dict)
+    slip_curves: Mapping[str, SlipCounts] = field(default_factory=dict)
 
 
 def summarise(decisions: Iterable[Decisions], *, n_resamples: int = 1000, seed: int = 0) -> Metrics:
@@ -212,11 +212,7 @@ def score_recording(decisions: Decisions, *, slip_curves: bool = False) -> Recor
         {name: metrics_of_samples(scores) for name, scores in samples.items()},
         _event_metrics([events], [hand], list(samples)),
     )
-    slips = {
-        name: finger.slip
-        for name, finger in decisions.fingers.items()
-        if finger.slip is not None and finger.slip.truth is not None
-    }
+    slips = decisions.known_slips
     return RecordingResults(
         metrics,
         samples,
@@ -282,8 +278,8 @@ class ResultTotal:
 
     def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
         """Compute the metrics; the arguments are those of `summarise`."""
-        curves = [SlipCurve.of_one(group.slips) for group in self.groups] if self.slips else []
-        slips = slip_intervals(curves, n=n_resamples, seed=seed, level=LEVEL)
+        curves = [group.slips.as_curve for group in self.groups] if self.slips else []
+        slips = slip_intervals(curves, n=n_resamples, seed=seed)
         return Metrics(
             fingers={
                 name: metrics_of_samples(total.samples) for name, total in self.fingers.items()
@@ -293,7 +289,7 @@ class ResultTotal:
             events=_event_metrics(self.events, self.hands, list(self.fingers)),
             intervals=self._intervals(n_resamples, seed),
             score_bins=N_BINS if self.binned else None,
-            slips=slip_summary([self.slips], slips),
+            slips=slip_summary([self.slips], slips) if self.slips else None,
         )
 
     def _intervals(self, n: int, seed: int) -> Intervals | None:

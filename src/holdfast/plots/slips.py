@@ -11,7 +11,7 @@ from holdfast.contact import SLIP_CODE, SLIP_SPEED
 from holdfast.detection import Model, detect
 from holdfast.metrics import Decisions
 from holdfast.metrics.masks import Mask, runs
-from holdfast.metrics.slip_thresholds import SlipSummary
+from holdfast.metrics.slip_curves import SlipSummary
 from holdfast.metrics.slips import FOUND_WITHIN, SlipCounts, SlipMetrics, count_slips
 from holdfast.plots import COLOURS
 from holdfast.plots.style import (
@@ -127,10 +127,7 @@ def draw_slips_found(axes: Axes, decisions: Sequence[Decisions], slips: SlipMetr
         slips: of all fingers.
     """
     counts = SlipCounts.total(
-        count_slips(finger.slip)
-        for decision in decisions
-        for finger in decision.fingers.values()
-        if finger.slip is not None and finger.slip.truth is not None
+        count_slips(slip) for decision in decisions for slip in decision.known_slips.values()
     )
     for limit in (0.0, *FOUND_WITHIN):
         axes.axvline(limit, color=GREY, linewidth=0.8, linestyle=":" if limit else "-")

@@ -6,8 +6,8 @@ from holdfast.training.calibration import CalibratedModel, calibrate, calibrate_
 from holdfast.training.evaluation import compute_decisions, evaluate
 from holdfast.training.setting import Setting
 from holdfast.training.teaching import Taught, teach, teach_with_report
+from holdfast.training.thresholds import CurvePoint, Tuned, tune
 from holdfast.training.trainer import Trained, train
-from holdfast.training.tune import CurvePoint, Tuned, tune
 
 if TYPE_CHECKING:
     from holdfast.training.estimator import StabilityClassifier

@@ -13,8 +13,8 @@ from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Ada
 from holdfast.training.dataset_scan import DatasetScan
 from holdfast.training.evaluation import was_trained_on
 from holdfast.training.finger_samples import FingerSamples, thinning_step
+from holdfast.training.parameter_grid import log_losses
 from holdfast.training.splits import TIME_FOLDS, TIME_GAP
-from holdfast.training.tuning import log_losses
 
 MAX_ADAPTATION_SAMPLES = 10_000
 """Maximum number of samples by which the adaptation is chosen, at even steps."""

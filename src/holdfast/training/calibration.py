@@ -1,8 +1,9 @@
 """Calibration: location, scale and thresholds of a model from its user's own handling."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import msgspec
 import numpy as np
@@ -12,12 +13,6 @@ from holdfast.detection.specs import KINDS
 from holdfast.errors import ModelError, TrainingError
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
-from holdfast.training.operating_point import (
-    GraspingFinger,
-    GraspingFingers,
-    HandlingFigures,
-    choose_operating_point,
-)
 from holdfast.training.own_handling import (
     ENOUGH_HANDLING,
     MAX_HANDLING,
@@ -27,9 +22,17 @@ from holdfast.training.own_handling import (
     grasped_samples,
     location_and_scale,
 )
-from holdfast.training.replay import ThresholdReplay
+from holdfast.training.thresholds import (
+    GraspingFinger,
+    GraspingFingers,
+    Steps,
+    ThresholdReplay,
+    choose_handling_thresholds,
+)
 
 MAX_FINGERS_SHOWN = 5
+WORSE = 0.5
+"""Change of a share of the held samples from which a calibration made it worse [% points]."""
 STILL_CHANGE = 0.03
 """Median change of the load below which the arm hardly moved, as a share of it."""
 MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
@@ -41,9 +44,6 @@ more in the held samples in which it does not slide; over half have more while t
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 
-Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
-
-
 COMPARED_FIGURES = (
     ("STABLE in the held samples [%]", "stable", 1),
     ("alarms per minute of holding", "alarms_per_minute", 1),
@@ -52,6 +52,48 @@ COMPARED_FIGURES = (
     ("threshold of a slip", "slip_threshold", 3),
 )
 """Text, field of the figures and number of digits of each row of the comparison."""
+
+
+class HandlingFigures(msgspec.Struct, frozen=True):
+    """Decisions of a model about own handling.
+
+    Attributes:
+        threshold: of the probability of stability.
+        stable: share of the held samples that are STABLE [%].
+        alarms_per_minute: alarms of all fingers per minute of held time.
+        slip_threshold: of the probability of a slip; None without a slip rule.
+        raised: share of the held samples in which a slip is reported [%]; None without one.
+    """
+
+    threshold: float
+    stable: float
+    alarms_per_minute: float
+    slip_threshold: float | None = None
+    raised: float | None = None
+
+    @classmethod
+    def of(cls, handling: GraspingFingers, part: FingerModel) -> Self:
+        """Return the figures at the thresholds of a model, which made the decisions."""
+        stable = part.stable.threshold
+        slip = None if part.slip is None else part.slip.threshold
+        return cls(
+            threshold=stable,
+            stable=100 * handling.share("stable", stable),
+            alarms_per_minute=handling.alarms_per_minute("stable", stable),
+            slip_threshold=slip,
+            raised=None if slip is None else 100 * handling.share("slip", slip),
+        )
+
+    def worse_than(self, other: "HandlingFigures") -> bool:
+        """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
+
+        An alarm begins and ends with STABLE, so more of them are no worse where more samples are
+        STABLE: a finger that is never STABLE has no alarm.
+        """
+        stable = self.stable - other.stable
+        raised = (self.raised or 0.0) - (other.raised or 0.0)
+        more_alarms = self.alarms_per_minute > other.alarms_per_minute
+        return stable < -WORSE or raised > WORSE or (stable <= 0 and more_alarms)
 
 
 class HandlingSummary(msgspec.Struct, frozen=True):
@@ -292,7 +334,7 @@ class _Calibration:
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            chosen = choose_operating_point(after[key], part, false_alarms, moves=moves)
+            chosen = choose_handling_thresholds(after[key], part, false_alarms, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
         model = _with_handling(self.model, handling)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)
@@ -308,8 +350,8 @@ class _Calibration:
                 n_changed=n_changed(part, own),
                 activity=activity(part, self.seen.features(key)),
                 still=self._still(key),
-                before=before[key].figures(part.for_sensor(key.sensor)),
-                after=after[key].figures(part.with_handling(own)),
+                before=HandlingFigures.of(before[key], part.for_sensor(key.sensor)),
+                after=HandlingFigures.of(after[key], part.with_handling(own)),
             )
             sensors.append(summary)
         return CalibratedModel(

@@ -52,13 +52,11 @@ class FingerSamples:
         """Return (n_units,) whether a unit has samples, and both classes are left without it."""
         counts = self._class_counts(n_units)
         left = counts.sum(axis=1, keepdims=True) - counts
-        can: npt.NDArray[np.bool_] = self.present(n_units) & (left > 0).all(axis=0)
-        return can
+        return np.asarray(self.present(n_units) & (left > 0).all(axis=0))
 
     def present(self, n_units: int) -> npt.NDArray[np.bool_]:
         """Return (n_units,) whether a unit has samples."""
-        present: npt.NDArray[np.bool_] = self._class_counts(n_units).sum(axis=0) > 0
-        return present
+        return np.asarray(self._class_counts(n_units).sum(axis=0) > 0)
 
     def _class_counts(self, n_units: int) -> Integers:
         """Return (2, n_units) number of samples of class 0 and class 1 in each unit."""

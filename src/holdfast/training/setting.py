@@ -17,9 +17,8 @@ from holdfast.detection import (
 from holdfast.detection.specs import SLIP_FEATURES, check_window
 from holdfast.errors import ModelError
 from holdfast.training.classifiers import recipe
-from holdfast.training.classifiers.fitting import ModelRecipe
+from holdfast.training.classifiers.fitting import Recipe
 from holdfast.training.classifiers.logreg import Adapted
-from holdfast.training.tuning import Objective
 
 Split = Literal["recording", "object", "time", "random"]
 SPLITS: tuple[Split, ...] = ("recording", "object", "time", "random")
@@ -34,7 +33,7 @@ LOAD_TO_NOISE_OF_CONTACT = 10.0
 DEFAULT_HOLD, DEFAULT_HYSTERESIS = 0.1, 0.1
 """Hold [s] and hysteresis of the models that `holdfast train` writes, see decision 12."""
 SEARCH_SAMPLES = 10_000
-"""Maximum number of samples per finger in the search for hyper-parameters, at even steps."""
+"""Maximum number of samples per finger for the choice of parameters, at even steps."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,7 @@ class Setting:
         split: unit that cross-validation leaves out: one `recording`, one `object`, a block of
             `time` of every recording, or `random` samples. The random split repeats the paper's
             protocol. The metrics of the last two are too good.
-        trials: of the search for hyper-parameters; 0 uses the reference parameters.
+        trials: 0 uses the reference parameters; None chooses them on a grid.
         seed: of all random numbers.
         shared: one classifier for all fingers instead of one for each; None for that of
             relative features alone, which are the same on every finger and sensor.
@@ -75,7 +74,7 @@ class Setting:
     window: int = DEFAULT_WINDOW
     tare: Tare | None = None
     split: Split = "recording"
-    trials: int = 30
+    trials: int | None = None
     seed: int = 0
     shared: bool | None = None
     contact_threshold: float | None = None
@@ -90,11 +89,13 @@ class Setting:
         check_window(self.window)
         if self.split not in SPLITS:
             raise ValueError(f"unknown split {self.split!r}; there are {', '.join(SPLITS)}")
-        if self.trials < 0 or self.max_samples < 1:
+        if self.trials:
             raise ValueError(
-                f"trials of at least 0 and samples of at least 1 expected; "
-                f"{self.trials} and {self.max_samples} given"
+                f"{self.trials} trials given, 0 or none expected: a training chooses its "
+                "parameters on a grid; holdfast study (holdfast-lab) has the search"
             )
+        if self.max_samples < 1:
+            raise ValueError(f"samples of at least 1 expected, {self.max_samples} given")
         if not 0 <= self.seed < 2**32:
             raise ValueError(f"a seed from 0 to 2^32 - 1 expected, {self.seed} given")
         threshold = self.contact_threshold
@@ -142,7 +143,7 @@ class Setting:
         defaults |= {"hold": init.debounce.hold, "hysteresis": init.debounce.hysteresis}
         return cls(**{**defaults, **chosen}, init=init)
 
-    def recipe_of(self, finger: str) -> ModelRecipe:
+    def recipe_of(self, finger: str) -> Recipe:
         """Return the way of fitting the classifier of a finger.
 
         Raises:
@@ -194,15 +195,6 @@ class Setting:
         if self.init is not None:
             return self.init.finger(finger).contact_load
         return LOAD_TO_NOISE_OF_CONTACT if self.relative else None
-
-    @property
-    def search_objective(self) -> Objective:
-        """Loss that the search minimises.
-
-        For the SVM, which has no probability of its own, it is the share of wrong decisions, as in
-        the paper; else the log loss.
-        """
-        return "error" if self.init is None and self.classifier == "svm" else "log_loss"
 
     @property
     def debounce(self) -> Debounce:

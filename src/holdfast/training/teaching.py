@@ -20,16 +20,17 @@ from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import TAUGHT_FEATURES
 from holdfast.errors import TrainingError
-from holdfast.metrics.slip_thresholds import (
+from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
     SlipSummary,
+    ThresholdChoice,
+    choose_threshold,
     slip_curve,
     slip_intervals,
     slip_summary,
-    weighted_threshold,
 )
-from holdfast.metrics.slip_truth import SlipDecisions, slip_truth
-from holdfast.metrics.slips import SlipCounts, SlipCurve, count_slips, slip_metrics
+from holdfast.metrics.slip_truth import slip_truth
+from holdfast.metrics.slips import SlipCounts, count_slips, slip_metrics
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.resampling import at_rate
@@ -39,7 +40,7 @@ from holdfast.training.dataset_scan import OneRecording, Progress, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.head_fits import fit_slip
 from holdfast.training.targets import TargetInput, TargetSamples, slip_target
-from holdfast.training.tune import N_SHOWN, CurvePoint
+from holdfast.training.thresholds import N_SHOWN, CurvePoint
 
 WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
@@ -165,7 +166,7 @@ class TaughtPart(NamedTuple):
     n_slips: int
 
 
-FoldScores = list[tuple[Mapping[str, SlipCurve], Mapping[str, SlipCounts]]]
+FoldScores = list[tuple[Mapping[str, SlipCounts], Mapping[str, SlipCounts]]]
 """Of each recording of a fold: counts of the taught head at each threshold, and of the base."""
 
 
@@ -232,24 +233,22 @@ def teach_with_report(
     scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples))
     scores = [pair for fold in progress(scored, "fitting", n_folds) for pair in fold]
     curves, counts_of_base = [curves for curves, _ in scores], [counts for _, counts in scores]
-    pooled = [SlipCurve.total(list(fingers.values())) for fingers in curves]
-    total = SlipCurve.total(pooled)
-    index = weighted_threshold(total, false_alarms)
-    slips = None
-    if index is not None:
-        slips = slip_summary(
-            [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
-            slip_intervals([SlipCurve.of_one(curve[index]) for curve in pooled], seed=seed),
-        )
-    if index is None or slips is None:
+    pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
+    total = SlipCounts.total(pooled)
+    index = choose_threshold(total, ThresholdChoice(false_alarms, "use"))
+    if index is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
-            f"{total.silent.held_seconds / 60:.2g} min of held time; more grasps expected in which "
+            f"{total.held_seconds / 60:.2g} min of held time; more grasps expected in which "
             "nothing slides, with pushes and taps"
         )
+    slips = slip_summary(
+        [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
+        slip_intervals([curve[index].as_curve for curve in pooled], seed=seed),
+    )
     head = _fitted(samples, ())
     shown = range(max(index - N_SHOWN, 0), min(index + N_SHOWN + 1, len(total)))
-    points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), slip_metrics(total[k])) for k in shown]
+    points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), total[k]) for k in shown]
     chosen = points[index - shown.start]
     head = head.at(chosen.threshold, chosen.choice(false_alarms, points=points))
     taught = base.changed(lambda part: part.with_heads(head))
@@ -269,7 +268,7 @@ def teach_with_report(
         _hand_alarms(curves, index),
         tuple(_curve_points(curves, total, {*SHOWN_FALSE_ALARMS, false_alarms})),
         len(parts),
-        tuple(_warnings(len(parts), total.silent, false_alarms)),
+        tuple(_warnings(len(parts), total[index], false_alarms)),
     )
 
 
@@ -396,39 +395,27 @@ def _score_fold(
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        curves = {name: slip_curve(slips) for name, slips in _known_slips(model, recording).items()}
-        counts = {
-            name: count_slips(slips) for name, slips in _known_slips(given, recording).items()
-        }
+        taught, base_slips = (compute_decisions(m, recording).known_slips for m in (model, given))
+        curves = {name: slip_curve(slips) for name, slips in taught.items()}
+        counts = {name: count_slips(slips) for name, slips in base_slips.items()}
         scores.append((curves, counts))
     return scores
 
 
-def _known_slips(model: Model, recording: Recording) -> dict[str, SlipDecisions]:
-    """Return the decisions about each finger whose slips are known; none without a slip rule."""
-    if not model.has_slip_rule:
-        return {}
-    fingers = compute_decisions(model, recording).fingers
-    return {
-        name: finger.slip
-        for name, finger in fingers.items()
-        if finger.slip is not None and finger.slip.truth is not None
-    }
-
-
-def _hand_alarms(curves: Sequence[Mapping[str, SlipCurve]], index: int) -> float:
+def _hand_alarms(curves: Sequence[Mapping[str, SlipCounts]], index: int) -> float:
     """Return the false alarms of all fingers per minute in which a finger of the hand holds."""
     counts = [[curve[index] for curve in fingers.values()] for fingers in curves]
     seconds = sum(max((c.held_seconds for c in own), default=0.0) for own in counts)
-    return 60 * sum(c.false_held for own in counts for c in own) / seconds
+    n: int = sum(c.false_held for own in counts for c in own)
+    return 60 * n / seconds
 
 
 def _curve_points(
-    curves: Sequence[Mapping[str, SlipCurve]], total: SlipCurve, wanted: Collection[float]
+    curves: Sequence[Mapping[str, SlipCounts]], total: SlipCounts, wanted: Collection[float]
 ) -> Iterator[TaughtPoint]:
     """Yield what the thresholds for the wanted rates give, where one fits."""
     for rate in sorted(wanted):
-        index = weighted_threshold(total, rate)
+        index = choose_threshold(total, ThresholdChoice(rate, "use"))
         if index is not None:
             metrics = slip_metrics(total[index])
             yield TaughtPoint(

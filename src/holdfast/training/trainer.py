@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import NamedTuple, Self
 
 import msgspec
@@ -15,7 +14,7 @@ from holdfast.metrics import (
     ResultTotal,
     score_recording,
 )
-from holdfast.metrics.slips import SlipCurve
+from holdfast.metrics.slips import SlipCounts
 from holdfast.parallel import Engine
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -26,7 +25,6 @@ from holdfast.training.adaptation import (
 )
 from holdfast.training.classifiers.fitting import Parameters, Samples
 from holdfast.training.dataset_scan import (
-    DatasetScan,
     OneRecording,
     Progress,
     RecordingScan,
@@ -35,7 +33,7 @@ from holdfast.training.dataset_scan import (
     show_nothing,
 )
 from holdfast.training.evaluation import combine_decisions, compute_decisions_and_tare
-from holdfast.training.finger_samples import FingerSamples, thin, thinning_step
+from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.head_fits import missing_heads
 from holdfast.training.model_fit import (
     TrainingData,
@@ -43,27 +41,23 @@ from holdfast.training.model_fit import (
     fit_model,
     training_record,
 )
+from holdfast.training.parameter_grid import INNER_FOLDS, choose_parameters
 from holdfast.training.setting import SEARCH_SAMPLES, Setting, Split
-from holdfast.training.slip_threshold import (
-    NO_SLIP_DECISIONS,
-    choose_slip_threshold,
-    with_slip_threshold,
-)
 from holdfast.training.splits import DataSplit, inner_folds, split_data
+from holdfast.training.thresholds import choose_slip_threshold, with_slip_threshold
 from holdfast.training.training_samples import SamplesPlan, gather_samples
-from holdfast.training.tuning import INNER_FOLDS, search
 from holdfast.training.verdict import LoadedTares, verdict
 
-MAX_SEARCHES = 5
-"""Maximum number of parameter searches for the cross-validation.
+MAX_CHOICES = 5
+"""Maximum number of choices of parameters for the cross-validation.
 
-The parameters with which a unit is evaluated come from a search that leaves the unit out."""
+The parameters with which a unit is evaluated come from a choice that leaves the unit out."""
 
 MAX_FITS = 500
 """Maximum number of models that the cross-validation fits.
 
 Of more recordings (or objects), every 500th is held out together. It is a multiple of
-`MAX_SEARCHES`, so that the search for each of these groups leaves it out."""
+`MAX_CHOICES`, so that the choice for each of these groups leaves it out."""
 
 MAX_UNDECIDED_FRACTION = 0.2
 """Warn when more than this fraction of the labelled samples has no decision."""
@@ -99,7 +93,6 @@ def train(
     recordings: Sequence[Recording],
     setting: Setting | None = None,
     *,
-    journal: Path | None = None,
     warn: Warn = lambda _: None,
     progress: Progress = show_nothing,
     n_jobs: int = 1,
@@ -113,28 +106,26 @@ def train(
     Args:
         recordings: labelled; may be a lazy dataset.
         setting: of the training; by default that of the paper's deployed model.
-        journal: file that keeps the trials of the search, so that it can be resumed.
         warn: is called with the text of every warning.
-        progress: iterates over recordings, searches and fits.
+        progress: iterates over recordings, choices and fits.
         n_jobs: number of processes on this machine; -1 for one per processor.
-        engine: that reads the recordings, searches and fits, instead of `n_jobs` processes. The
+        engine: that reads the recordings, chooses and fits, instead of `n_jobs` processes. The
             result is the same. On a cluster, all machines need the recordings at the same
-            paths, and the journal is not used.
+            paths.
 
     Raises:
         TrainingError: there are no labels, only one class, or too few recordings or objects
             for the split.
         ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
-        OutputError: the journal cannot be written.
         EngineError: the engine cannot be used.
     """
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
-    trainer = _Trainer.read(recordings, setting, journal, warn, progress, engine)
+    trainer = _Trainer.read(recordings, setting, warn, progress, engine)
     trainer.check()
-    # The first search has all samples, and gives the final model its parameters. The others leave
+    # The first choice has all samples, and gives the final model its parameters. The others leave
     # out the units that their parameters are evaluated on.
-    final, *held_out = trainer.search([set(), *trainer.search_units()])
+    final, *held_out = trainer.choose_parameters([set(), *trainer.choice_units()])
     model = fit_full_model(trainer.data, trainer.setting, final)
     scored = trainer.cross_validate(held_out or [final])
     n_undecided = scored.metrics.pooled.n_undecided
@@ -154,7 +145,7 @@ def train(
     # The figures in the file are those after the choice of the threshold: slips are among them.
     provenance = training_record(
         trainer.setting,
-        trainer.scan,
+        trainer.data.scan,
         final,
         metrics.pooled,
         trainer.data.thinned,
@@ -166,7 +157,7 @@ def train(
     )
     model = msgspec.structs.replace(model, training=provenance)
     init = trainer.setting.init
-    known = () if init is None else tuple(known_recordings(init, trainer.scan))
+    known = () if init is None else tuple(known_recordings(init, trainer.data.scan))
     tares = LoadedTares(scored.n_loaded, len(recordings))
     return Trained(model, metrics, trainer.setting.split, tares, known)
 
@@ -181,7 +172,7 @@ class OutOfFold(NamedTuple):
     """
 
     metrics: Metrics
-    slip_curves: list[Mapping[str, SlipCurve]]
+    slip_curves: list[Mapping[str, SlipCounts]]
     n_loaded: int
 
 
@@ -193,16 +184,14 @@ class _Trainer:
         recordings: of the dataset.
         setting: of the training, with what follows from the dataset.
         data: training samples of every head.
-        journal: file that keeps the trials of the search.
         warn: is called with the text of every warning.
-        progress: iterates over recordings, searches and fits.
-        engine: that reads the recordings, searches and fits.
+        progress: iterates over recordings, choices and fits.
+        engine: that reads the recordings, chooses and fits.
     """
 
     recordings: Sequence[Recording]
     setting: Setting
     data: TrainingData
-    journal: Path | None
     warn: Warn
     progress: Progress
     engine: Engine
@@ -212,7 +201,6 @@ class _Trainer:
         cls,
         recordings: Sequence[Recording],
         setting: Setting,
-        journal: Path | None,
         warn: Warn,
         progress: Progress,
         engine: Engine,
@@ -247,24 +235,7 @@ class _Trainer:
         if own and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
         data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
-        # Machines of a cluster share no file to which all may append.
-        journal = journal if engine.scheduler is None else None
-        return cls(recordings, setting, data, journal, warn, progress, engine)
-
-    @property
-    def scan(self) -> DatasetScan:
-        """What was read of the recordings."""
-        return self.data.scan
-
-    @property
-    def data_split(self) -> DataSplit:
-        """Units that are held out together."""
-        return self.data.data_split
-
-    @property
-    def fingers(self) -> Mapping[str, FingerSamples]:
-        """Training samples of the heads of stability."""
-        return self.data.fingers
+        return cls(recordings, setting, data, warn, progress, engine)
 
     def check(self) -> None:
         """Check the samples, and warn of metrics that are missing or may be wrong.
@@ -275,38 +246,40 @@ class _Trainer:
         """
         self.data.check_classes()
         for finger, (n_used, n) in self.data.thinned.items():
-            step = thinning_step(self.scan.n_labelled, self.setting.max_samples)
+            step = thinning_step(self.data.scan.n_labelled, self.setting.max_samples)
             self.warn(
                 f"{finger}: fitted to {n_used} of {n} labelled samples, one of {step} "
                 "(--max-samples); the metrics are on all of them"
             )
-        if self.setting.init is not None:
-            for warning in adaptation_warnings(self.setting.init, self.scan, self.fingers):
+        if (init := self.setting.init) is not None:
+            for warning in adaptation_warnings(init, self.data.scan, self.data.fingers):
                 self.warn(warning)
         for finger, names in self.data.units_without_model().items():
             first = ", ".join(names[:3]) + (" ..." if len(names) > 3 else "")
             self.warn(f"{finger} has only one class of labels without {first}: not evaluated there")
 
-    def search_units(self) -> list[set[int]]:
-        """Return the units that each search for the cross-validation leaves out."""
-        n_units = len(self.data_split.units)
-        n_searches = min(MAX_SEARCHES, n_units) if self.setting.trials else 0
-        return [set(range(k, n_units, n_searches)) for k in range(n_searches)]
+    def choice_units(self) -> list[set[int]]:
+        """Return the units that each choice for the cross-validation leaves out."""
+        n_units = len(self.data.data_split.units)
+        n_choices = min(MAX_CHOICES, n_units) if self.setting.trials is None else 0
+        return [set(range(k, n_units, n_choices)) for k in range(n_choices)]
 
-    def search(self, left_out_units: Sequence[Collection[int]]) -> list[dict[str, Parameters]]:
-        """Search the parameters of every finger, once for each collection of held-out units.
+    def choose_parameters(
+        self, left_out_units: Sequence[Collection[int]]
+    ) -> list[dict[str, Parameters]]:
+        """Choose the parameters of every finger, once for each collection of held-out units.
 
-        Without trials, return the reference parameters. A model to adapt has a few candidates
-        instead of a search.
+        With 0 trials, return the reference parameters. A model to adapt has a few candidates
+        instead of a grid.
         """
-        setting, init = self.setting, self.setting.init
-        if not setting.trials:
-            reference = {finger: setting.recipe_of(finger).reference for finger in self.fingers}
+        setting, init, fingers = self.setting, self.setting.init, self.data.fingers
+        if setting.trials is not None:
+            reference = {finger: setting.recipe_of(finger).reference for finger in fingers}
             return [reference for _ in left_out_units]
         found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
         if init is not None:
             for left_out, parameters_of in zip(left_out_units, found, strict=True):
-                for finger, pool in self.fingers.items():
+                for finger, pool in fingers.items():
                     prior = init.finger(finger).stable.rule
                     adaptation = choose_adaptation(pool, prior, left_out)
                     parameters_of[finger] = adaptation.parameters
@@ -314,47 +287,45 @@ class _Trainer:
                         self.warn(adaptation.describe(init.name or "the model to adapt", finger))
             return found
         tasks = (
-            (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger, self.journal)
+            (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger)
             for left_out in left_out_units
-            for finger, pool in self.fingers.items()
+            for finger, pool in fingers.items()
         )
-        results = self.engine.map_ordered(_search, tasks)
-        n_tasks = len(left_out_units) * len(self.fingers)
-        searched = list(self.progress(results, "searching", n_tasks))
-        for warning in dict.fromkeys(warning for _, warning in searched if warning):
+        results = self.engine.map_ordered(_choose, tasks)
+        n_tasks = len(left_out_units) * len(fingers)
+        chosen = list(self.progress(results, "choosing", n_tasks))
+        for warning in dict.fromkeys(warning for _, warning in chosen if warning):
             self.warn(warning)
-        parameters = iter(parameters for parameters, _ in searched)
-        return [{finger: next(parameters) for finger in self.fingers} for _ in left_out_units]
+        parameters = iter(parameters for parameters, _ in chosen)
+        return [{finger: next(parameters) for finger in fingers} for _ in left_out_units]
 
-    def cross_validate(self, searched: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
+    def cross_validate(self, chosen: Sequence[Mapping[str, Parameters]]) -> OutOfFold:
         """Score predictions out of fold.
 
         Args:
-            searched: parameters of every finger from each search. Unit k uses those of search k
-                modulo the number of searches.
+            chosen: parameters of every finger from each choice. Unit k uses those of choice k
+                modulo the number of choices.
         """
-        n_units = len(self.data_split.units)
+        n_units = len(self.data.data_split.units)
         n_fits = min(n_units, MAX_FITS)
-        n = len(searched)
-        tasks = ((searched[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
+        n = len(chosen)
+        tasks = ((chosen[k % n], set(range(k, n_units, n_fits))) for k in range(n_fits))
         fits = self.engine.map_ordered(fit_model, tasks, shared=(self.data, self.setting))
         models = list(self.progress(fits, "fitting", n_fits))
         if n_fits < n_units:
-            self.warn(
-                f"{n_units} {self.data_split.split}s are held out in {n_fits} groups, not alone"
-            )
+            self.warn(f"{n_units} {self.setting.split}s are held out in {n_fits} groups, not alone")
 
         def calls() -> Iterator[tuple[int, str, Sequence[Recording], list[Model | None]]]:
-            by_samples = self.data_split.split in ("time", "random")
-            for index, scanned in enumerate(self.scan.recordings):
+            by_samples = self.data.data_split.split in ("time", "random")
+            for index, scanned in enumerate(self.data.scan.recordings):
                 # A recording is scored by the one model that was fitted without it; if samples
                 # are held out, by each model on its samples; without labels, by none.
                 used = models if scanned.n_labelled else []
                 if used and not by_samples:
-                    used = [models[self.data_split.group_of[index] % len(models)]]
+                    used = [models[self.data.data_split.group_of[index] % len(models)]]
                 yield index, scanned.name, OneRecording(self.recordings, index), used
 
-        context = (self.data_split, len(self.fingers))
+        context = (self.data.data_split, len(self.data.fingers))
         evaluated = self.engine.map_ordered(_score_out_of_fold, calls(), shared=context)
         total, slip_curves, n_loaded = ResultTotal(), [], 0
         for results, loaded in self.progress(evaluated, "evaluating", len(self.recordings)):
@@ -377,15 +348,14 @@ class _Trainer:
                 for name, part in model.fingers.items()
             }
             return replace_fields(model, fingers=fingers), metrics
-        chosen = None
-        if model.has_slip_rule:
-            groups = self.data_split.group_of.tolist()
-            chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
-            if chosen is None or chosen.reason:
-                self.warn(NO_SLIP_DECISIONS if chosen is None else chosen.reason)
-        model = with_slip_threshold(model, chosen)
-        slips = chosen.metrics if chosen is not None and model.has_slip_rule else None
-        return model, replace_fields(metrics, slips=slips)
+        if not model.has_slip_rule:
+            return with_slip_threshold(model, None), replace_fields(metrics, slips=None)
+        groups = self.data.data_split.group_of.tolist()
+        chosen = choose_slip_threshold(scored.slip_curves, groups, self.setting.seed)
+        if chosen.point is None:
+            self.warn(f"{chosen.reason}; the model gets no slip rule")
+        slips = None if chosen.point is None else chosen.metrics
+        return with_slip_threshold(model, chosen.point), replace_fields(metrics, slips=slips)
 
 
 def _that_fit(
@@ -454,22 +424,12 @@ def _score_out_of_fold(
     return score_recording(combined, slip_curves=True), loaded
 
 
-def _search(
-    samples: Samples, setting: Setting, finger: str, journal: Path | None
-) -> tuple[Parameters, str]:
-    """Return the parameters of a finger, and a warning if a search is not possible."""
-    folds = inner_folds(samples, INNER_FOLDS, setting.seed)
-    if len(folds) < 2:
-        return setting.recipe_of(finger).reference, (
-            f"{finger}: {len(folds)} of the folds by recording have both classes, 2 needed to "
-            "search for parameters; the reference parameters are used"
-        )
-    return search(
-        samples,
-        folds,
-        setting.recipe_of(finger),
-        n_trials=setting.trials,
-        seed=setting.seed,
-        objective=setting.search_objective,
-        journal=journal,
-    ), ""
+def _choose(samples: Samples, setting: Setting, finger: str) -> tuple[Parameters, str]:
+    """Return the parameters of a finger, and a warning if they cannot be chosen."""
+    folds, recipe = inner_folds(samples, INNER_FOLDS, setting.seed), setting.recipe_of(finger)
+    if len(folds) >= 2:
+        return choose_parameters(samples, folds, recipe, setting.seed), ""
+    return recipe.reference, (
+        f"{finger}: {len(folds)} of the folds by recording have both classes, 2 needed to choose "
+        "parameters; the reference parameters are used"
+    )

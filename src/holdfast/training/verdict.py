@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from holdfast.metrics import Metrics, SampleMetrics
-from holdfast.metrics.slip_thresholds import SlipSummary
+from holdfast.metrics.slip_curves import SlipSummary
 from holdfast.metrics.statistics import Interval
 
 CHANCE_AUC = 0.55

@@ -1,8 +1,4 @@
 import json
-import signal
-import subprocess
-import sys
-import time
 
 import pytest
 
@@ -51,7 +47,7 @@ def test_json_has_the_fields_of_the_contract(capsys, data, model):
 
 def test_it_is_the_library_that_trains(capsys, data, model):
     words = ["--window", 8, "--features", "F_a,sigma", "--classifier", "svm", "--tare", "0.4",
-             "--split", "object", "--trials", 2, "--seed", 3, "--shared",
+             "--split", "object", "--seed", 3, "--shared",
              "--contact-threshold", 9.5, "--max-samples", 900, "--jobs", 1]  # fmt: skip
     assert run(capsys, data, "-o", model, *words)[0] == 0
     from holdfast.detection import Tare, parse_features
@@ -62,7 +58,6 @@ def test_it_is_the_library_that_trains(capsys, data, model):
         window=8,
         tare=Tare.parse("0.4"),
         split="object",
-        trials=2,
         seed=3,
         shared=True,
         contact_threshold=9.5,
@@ -81,52 +76,6 @@ def test_data_that_cannot_train_leave_everything_as_it_was(capsys, tmp_path, mod
     assert run(capsys, tmp_path / "data", "-o", model, "--force")[0] == 2
     assert model.read_text() == "mine"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["data", "model.json"]
-
-
-def test_a_search_left_over_is_removed_by_force(capsys, data, model):
-    journal = model.with_name("model.json.search")
-    journal.write_text("")
-    assert run(capsys, data, "-o", model, "--trials", 0, "--force")[0] == 0
-    assert not journal.exists()
-
-
-def test_a_killed_search_goes_on_to_the_same_end(capsys, data, model, tmp_path):
-    whole = tmp_path / "whole.json"
-    words = ["--trials", "4", "--json"]
-    expected = json.loads(run(capsys, data, "-o", whole, *words)[1])
-    program = "import sys; from holdfast.cli import main; sys.exit(main(sys.argv[1:]))"
-    command = [sys.executable, "-c", program, "train", str(data), "-o", str(model), *words]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    journal = model.with_name("model.json.search")
-    while process.poll() is None and not (journal.exists() and journal.stat().st_size > 300):
-        time.sleep(0.01)
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    assert not model.exists()
-    n_lines = len(journal.read_bytes().split(b"\n\n"))
-    code, out, _ = run(capsys, data, "-o", model, "--resume", *words)
-    assert code == 0
-    assert json.loads(out)["cross_validation"] == expected["cross_validation"]
-    assert Model.load(model) == Model.load(whole)
-    assert n_lines < 4 * 8
-    assert not journal.exists()
-
-
-def test_an_interrupt_names_resume(capsys, data, model, monkeypatch):
-    from holdfast.training import tuning
-
-    add, n_trials = tuning.Journal.add, []
-
-    def stops(*given):
-        n_trials.append(1)
-        if len(n_trials) == 3:
-            raise KeyboardInterrupt
-        add(*given)
-
-    monkeypatch.setattr(tuning.Journal, "add", stops)
-    code, out, err = run(capsys, data, "-o", model, "--trials", 4)
-    assert (code, out) == (130, "")
-    assert f"{model}.search" in err and "--resume" in err
 
 
 def test_a_model_is_adapted(capsys, data, model):

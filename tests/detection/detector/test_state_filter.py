@@ -11,7 +11,7 @@ from holdfast.detection import ANY_FINGER, Debounce, Detector, FeatureSpec, Mode
 from holdfast.detection.model_files import decode, encode
 from holdfast.errors import ModelError
 from holdfast.synthetic import synthetic_recording
-from holdfast.training.replay import ThresholdReplay
+from holdfast.training.thresholds import ThresholdReplay
 
 from .build import finger_model, linear, sensor
 

@@ -1,7 +1,5 @@
 """Logistic regression between the prior and the samples."""
 
-from dataclasses import replace
-
 import msgspec
 import numpy as np
 import pytest
@@ -10,8 +8,8 @@ from sklearn.linear_model import LogisticRegression
 
 from holdfast.detection import Linear
 from holdfast.errors import TrainingError
-from holdfast.training.classifiers import Adapted, Fitted
-from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, log_odds
+from holdfast.training.classifiers.fitting import Fitted
+from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted, log_odds
 
 from .test_recipes import samples
 
@@ -168,16 +166,3 @@ def test_one_class_is_refused(stable):
 def test_another_number_of_features_is_refused():
     with pytest.raises(ValueError, match="3 expected"):
         adapted(1.0, GIVEN._replace(features=GIVEN.features[:, :2]))
-
-
-def test_every_prior_has_a_name_of_its_own():
-    """The journal of a search depends on it."""
-    near = msgspec.structs.replace(PRIOR, intercepts=(np.nextafter(0.6, 1),))
-    assert Adapted(PRIOR).name == replace(Adapted(PRIOR)).name
-    assert len({Adapted(prior).name for prior in (PRIOR, UNLIKE, near)}) == 3
-    assert Adapted(PRIOR, 0.2).name != Adapted(PRIOR).name  # the search may count errors
-
-
-def test_an_unknown_change_is_refused():
-    with pytest.raises(ValueError, match="'all'"):
-        adapted(1.0, change="all")

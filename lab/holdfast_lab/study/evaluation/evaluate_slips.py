@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from holdfast.metrics.masks import runs
-from holdfast.metrics.slip_thresholds import (
+from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLD_LOG_ODDS,
     SlipSummary,
     ThresholdChoice,
@@ -22,7 +22,7 @@ from holdfast.metrics.slip_thresholds import (
     summarise_choice,
 )
 from holdfast.metrics.slip_truth import STILL, SlipDecisions, SlipTruth
-from holdfast.metrics.slips import SlipCurve
+from holdfast.metrics.slips import SlipCounts
 from holdfast.sensors.types import Array
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob, score_splits
@@ -35,7 +35,7 @@ CHOICE = ThresholdChoice(SLIP_RATE)
 QUIET_CHOICE = ThresholdChoice(SLIP_RATE, "quiet")
 """Choice by the false alarms of quiet hold alone: pushes and glitches may raise a slip."""
 
-Curves = Sequence[Mapping[str, SlipCurve]]
+Curves = Sequence[Mapping[str, SlipCounts]]
 """Counts of slips of each finger, at each threshold, of each recording."""
 
 
@@ -161,7 +161,7 @@ def log_odds_of(score: Array, ranks: Array) -> Array:
     return np.asarray(np.where(np.isnan(score), np.nan, lowest + (highest - lowest) * depth))
 
 
-def slip_curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, SlipCurve]:
+def slip_curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, SlipCounts]:
     """Return the counts of slips of each finger at each threshold.
 
     Args:
@@ -190,14 +190,9 @@ def summarise_slips(
     """Return the metrics of recordings at the thresholds of both budgets.
 
     The arguments are those of `summarise_choice`.
-
-    Raises:
-        ValueError: no slips are known.
     """
     summary, quiet_budget = (
         summarise_choice(curves, choice, groups=groups, training=training, seed=seed)
         for choice in (CHOICE, QUIET_CHOICE)
     )
-    if summary is None or quiet_budget is None:
-        raise ValueError("recordings with known slips expected")
     return SlipEvaluation(split, len(curves), summary, quiet_budget)

@@ -18,7 +18,7 @@ from holdfast.metrics import Decisions, FingerDecisions, hand_decisions
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import Mask
 from holdfast.sensors.types import Array
-from holdfast.training.classifiers import Classifier, Samples
+from holdfast.training.classifiers import Samples
 from holdfast.training.finger_samples import (
     concatenate,
     contact_threshold,
@@ -26,6 +26,7 @@ from holdfast.training.finger_samples import (
     thinning_step,
     usable_rows,
 )
+from holdfast_lab.classifiers import Classifier
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
 from holdfast_lab.study.methods import HAND, Method
 

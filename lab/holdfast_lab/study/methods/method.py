@@ -21,7 +21,8 @@ from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast.sensors.xela_models import NEWTONS_PER_NORMAL_COUNT
-from holdfast.training.classifiers import Parameters, Recipe
+from holdfast.training.classifiers import Parameters
+from holdfast_lab.classifiers import StudyRecipe
 
 HAND = "hand"
 """Key of the features of a whole-hand method."""
@@ -154,7 +155,7 @@ class Method:
     category: Category
     source: str
     features: Callable[[HandSignal], Mapping[str, Array]]
-    recipe: Recipe
+    recipe: StudyRecipe
     parameters: Parameters | None = None
     whole_hand: bool = False
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from holdfast.detection import ANY_FINGER, DEFAULT_WINDOW, Model
 from holdfast.detection.features import extract
@@ -14,9 +13,6 @@ from holdfast.training.classifiers import Parameters, Samples
 from holdfast.training.classifiers.fitting import Fitted
 from holdfast_lab.study.methods.method import HandSignal, Method, stretchwise
 
-if TYPE_CHECKING:
-    from optuna import Trial
-
 
 @dataclass(frozen=True)
 class FixedRule:
@@ -24,18 +20,11 @@ class FixedRule:
 
     Attributes:
         rule: of the probability.
-        name: of the recipe.
         reference: reference parameters: none.
     """
 
     rule: Linear
-    name: str = "fixed"
     reference: Parameters = field(default_factory=dict)
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Return no parameters; there are none to search."""
-        del trial
-        return {}
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Return the rule; the arguments are not used."""

@@ -6,7 +6,6 @@ training, in five folds of four parts.
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
@@ -15,18 +14,15 @@ import numpy.typing as npt
 from holdfast.metrics import bootstrap_interval, ratio_of_sums
 from holdfast.metrics.statistics import percent
 from holdfast.sensors.types import Integers
-from holdfast.training.classifiers import RECIPES, Classifier, Parameters, Recipe, Samples
+from holdfast.training.classifiers import RECIPES, Parameters, Recipe, Samples
 from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
-from holdfast.training.tuning import search
+from holdfast_lab.classifiers import Classifier, StudyRecipe
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.paper.pooled_samples import SamplePool, pool_samples
 from holdfast_lab.study.plan import Corpus
-
-if TYPE_CHECKING:
-    from optuna import Trial
 
 N_FOLDS = 5
 N_HELD_OUT_PARTS = 5
@@ -41,31 +37,31 @@ TEST_DATA = (TRAINING, VALIDATED, HELD_OUT, FRESH, OTHER_RECORDINGS, UNSEEN_OBJE
 """Data on which a classifier may be tested, in the order of the tables."""
 
 
+SEARCHED_C = {"logreg": (1e-4, 1e4), "svm": (1e-5, 1e3)}
+"""Range of C in which the search draws."""
+
+
 @dataclass(frozen=True)
 class FixedWeights:
     """A recipe whose class weights are fixed, and not found by the search.
 
     Attributes:
-        recipe: that fits the classifier.
+        name: of the recipe.
         class_weight: "balanced", or None to weight all samples alike.
     """
 
-    recipe: Recipe
+    name: str
     class_weight: str | None
 
     @property
-    def name(self) -> str:
-        """Name of the recipe."""
-        return self.recipe.name
+    def recipe(self) -> Recipe:
+        """The recipe, which fits the classifier."""
+        return RECIPES[self.name]
 
     @property
     def reference(self) -> Parameters:
         """Reference parameters, with the fixed weights."""
         return self.fixed(self.recipe.reference)
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw parameters; the weights are overridden in the fit."""
-        return self.recipe.suggest(trial)
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Classifier:
         """Fit a classifier with the fixed weights."""
@@ -76,9 +72,9 @@ class FixedWeights:
         return {**parameters, "class_weight": self.class_weight}
 
 
-FIT_RECIPES: dict[str, Recipe] = {
-    **{name: FixedWeights(recipe, None) for name, recipe in RECIPES.items()},
-    **{f"{name}_balanced": FixedWeights(recipe, "balanced") for name, recipe in RECIPES.items()},
+FIT_RECIPES: dict[str, StudyRecipe] = {
+    **{name: FixedWeights(name, None) for name in RECIPES},
+    **{f"{name}_balanced": FixedWeights(name, "balanced") for name in RECIPES},
     "threshold": Threshold(side="below"),
 }
 """How each classifier is fitted; a threshold calls samples below it stable.
@@ -201,7 +197,7 @@ def rate_rows(
 class _Fit:
     """A recipe with its hyper-parameters."""
 
-    recipe: Recipe
+    recipe: StudyRecipe
     parameters: Parameters
     n_fit: int
     seed: int
@@ -243,17 +239,12 @@ def _evaluate(
     folds = main.parts[in_training] % N_FOLDS
     # Hyper-parameters by Bayesian optimisation of the error over random folds, as in the paper.
     parameters: Parameters = {}
-    if recipe.reference:
+    if isinstance(recipe, FixedWeights):
         # The masks are thinned by the step by which `thin` takes the samples.
         few = _ungrouped(thin(train, SEARCH_SAMPLES))
         step = thinning_step(len(folds), SEARCH_SAMPLES)
         masks = [folds[::step] == fold for fold in range(N_FOLDS)]
-        parameters = search(
-            few, masks, recipe, n_trials=budget.trials, seed=seed, objective="error"
-        )
-        # The search draws weights too, which the fits ignore: report those that were used.
-        if isinstance(recipe, FixedWeights):
-            parameters = recipe.fixed(parameters)
+        parameters = search(few, masks, recipe, budget.trials, seed)
     fit = _Fit(recipe, parameters, budget.n_fit, seed)
     classifier = fit(train)
     counts = {HELD_OUT: confusion_counts(classifier, samples.take(~in_training), n)}
@@ -271,6 +262,43 @@ def _evaluate(
         len(thin(train, budget.n_fit).positive),
         {on: counts[on].tolist() for on in TEST_DATA if on in counts},
     )
+
+
+def search(
+    samples: Samples,
+    folds: Sequence[npt.NDArray[np.bool_]],
+    recipe: FixedWeights,
+    n_trials: int,
+    seed: int,
+) -> Parameters:
+    """Return the parameters with the fewest errors in the held-out samples of the folds.
+
+    The first trial is the reference setting; the others are drawn by TPE.
+    """
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)  # its warnings are tracebacks
+    pairs = [(samples.take(~held_out), samples.take(held_out)) for held_out in folds]
+    low, high = SEARCHED_C[recipe.name]
+
+    def error_of(trial: optuna.Trial) -> float:
+        # The weights are drawn too, although the fits ignore them: the published draws of C are
+        # those beside them.
+        parameters = {
+            "C": trial.suggest_float("C", low, high, log=True),
+            "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
+        }
+        n_wrong = 0
+        for fitted, tested in pairs:
+            classifier = recipe.fit(fitted, parameters, seed)
+            called = classifier.probability(tested.features) >= classifier.threshold
+            n_wrong += int((called != tested.positive).sum())
+        return n_wrong / sum(len(tested.positive) for _, tested in pairs)
+
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+    study.enqueue_trial(dict(recipe.reference))
+    study.optimize(error_of, n_trials=n_trials)
+    return recipe.fixed(study.best_params)
 
 
 def _substitute_folds(

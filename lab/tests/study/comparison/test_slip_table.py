@@ -1,7 +1,7 @@
 import msgspec
 import pytest
 
-from holdfast.metrics.slip_thresholds import SlipIntervals, SlipSummary
+from holdfast.metrics.slip_curves import SlipIntervals, SlipSummary
 from holdfast.metrics.slips import SlipMetrics
 from holdfast_lab.report.table_layouts import to_markdown
 from holdfast_lab.study.comparison.slip_table import (

@@ -4,9 +4,9 @@ import pytest
 
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
-from holdfast.metrics import slip_thresholds
-from holdfast.metrics.slip_thresholds import SLIP_THRESHOLDS, ThresholdChoice
+from holdfast.metrics.slip_curves import SLIP_THRESHOLDS, ThresholdChoice
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
+from holdfast.metrics.slips import SlipCounts
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
@@ -190,16 +190,17 @@ def test_without_known_slips_there_are_no_results(tmp_path):
 def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
     """What is tested does not change the choice."""
     seen = []
-    choose = slip_thresholds.choose_threshold
+    summarise = module.summarise_choice
 
-    def noted(curve, *rest):
-        seen.append(curve)
-        return choose(curve, *rest)
+    def noted(curves, choice, *, training, **options):
+        seen.append([curve for fingers in training for curve in fingers.values()])
+        return summarise(curves, choice, training=training, **options)
 
-    monkeypatch.setattr(slip_thresholds, "choose_threshold", noted)
+    monkeypatch.setattr(module, "summarise_choice", noted)
     evaluated(corpora, "holdfast")
-    assert len(seen) == 2  # for each budget
-    for curve in seen:
+    of_others = [curves for curves in seen if curves]
+    assert len(of_others) == 2  # for each budget
+    for curve in map(SlipCounts.total, of_others):
         held_seconds = 4 * (2 * 7.2 - 1.353)  # the thumb slips
         assert curve[0].held_seconds == pytest.approx(held_seconds, rel=0.01)
 

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holdfast.detection import DEPLOYED_FEATURES, Linear
-from holdfast.training.classifiers import Fitted, Samples
+from holdfast.training.classifiers.fitting import Fitted, Samples
 from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
@@ -17,9 +17,11 @@ from holdfast_lab.study.paper.random_split import (
     UNSEEN_OBJECTS,
     VALIDATED,
     FitBudget,
+    FixedWeights,
     confusion_counts,
     evaluate_variants,
     rate_rows,
+    search,
 )
 from study.example_recordings import corpora_of
 
@@ -121,6 +123,38 @@ def test_a_search_tries_more_than_the_reference(corpora, alone):
         cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
     assert set(cell.parameters) == set(reference)
     assert len({each["C"] for each in drawn}) == 4
+
+
+@pytest.mark.parametrize("name", ["logreg", "svm"])
+def test_the_search_takes_the_fewest_errors_of_its_trials(name):
+    """Counted from the definition for every C that was drawn, the reference among them."""
+    rng = np.random.default_rng(0)
+    positive, groups = rng.random(200) < 0.4, np.arange(200) % 4
+    features = rng.normal(size=(200, 3)) + 0.6 * positive[:, None]
+    samples = Samples(features, positive, np.zeros(200, dtype=int))
+    drawn, folds, recipe = [], [groups == k for k in range(4)], FixedWeights(name, None)
+    fit = type(recipe.recipe).fit
+
+    def noted(self, samples, parameters, seed):
+        drawn.append(parameters)
+        return fit(self, samples, parameters, seed)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(recipe.recipe), "fit", noted)
+        best = search(samples, folds, recipe, 6, 0)
+    tried = drawn[::4]
+    assert tried[0] == recipe.reference
+    assert len({parameters["C"] for parameters in tried}) == 6
+
+    def n_wrong(parameters):
+        fits = [(recipe.fit(samples.take(~held), parameters, 0), held) for held in folds]
+        return sum(
+            ((rule.probability(features[held]) >= rule.threshold) != positive[held]).sum()
+            for rule, held in fits
+        )
+
+    assert best in tried
+    assert n_wrong(best) == min(map(n_wrong, tried))
 
 
 def test_class_weights_are_fixed_whatever_the_search_draws(corpora):

@@ -57,9 +57,9 @@ class TrainingOptions:
         ),
     ] = "recording"
     trials: Annotated[
-        int,
-        typer.Option(help="Trials of the parameter search; 0 uses the reference parameters."),
-    ] = 30
+        int | None,
+        typer.Option(help="0 uses the reference parameters, not the best of a grid."),
+    ] = None
     seed: SeedOption = 0
     shared: Annotated[
         bool | None,

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 import typer
 
 from holdfast.cli.options import (
-    RARE,
     EngineOptions,
     ForceOption,
     JsonOption,
@@ -46,9 +45,6 @@ def train(
             show_default=False,
         ),
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Continue a search that was stopped."), RARE
-    ] = False,
     parallel: EngineOptions,
     force: ForceOption = False,
     start: StartOptions,
@@ -73,8 +69,8 @@ def train(
       holdfast train recordings/ -o model.json --for slip
     """
     if only is not None:
-        if options != TrainingOptions() or resume:
-            raise ValueError("--for slip has no search and its own features: leave the others out")
+        if options != TrainingOptions():
+            raise ValueError("--for slip has its own parameters and features: leave the others out")
         teach(
             out=model, data=data, model=init or "builtin:any", parallel=parallel, force=force,
             start=start, as_json=as_json,
@@ -84,28 +80,15 @@ def train(
     from holdfast.files import refuse_overwrite
     from holdfast.labelling.review.findings import report_hidden_labels
     from holdfast.training import train as fit
-    from holdfast.training.tuning import search_journal
     from holdfast.training.verdict import no_verdict
 
     setting = options.setting(init)
     refuse_overwrite(model, force=force)  # before a training, which may take hours
     started = parallel.start()
-    if resume and started.scheduler is not None:
-        raise ValueError("--resume is for --engine loky; a search on a cluster keeps no trials")
     recordings = start.load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
-    journal = search_journal(model, resume=resume, force=force)
-    try:
-        trained = fit(
-            recordings, setting, journal=journal,
-            warn=print_message, progress=progress, engine=started,
-        )  # fmt: skip
-    except KeyboardInterrupt:
-        if journal.exists():
-            print_message(f"the trials so far are in {journal}: continue with --resume")
-        raise
+    trained = fit(recordings, setting, warn=print_message, progress=progress, engine=started)
     trained.model.save(model, force=force)
-    journal.unlink(missing_ok=True)  # only now: a search that was stopped goes on from it
     split, n, scores = trained.split, len(recordings), trained.cross_validation
     if as_json:
         verdict = trained.verdict

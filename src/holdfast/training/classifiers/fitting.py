@@ -2,16 +2,13 @@
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.detection.heads import Linear
 from holdfast.errors import TrainingError
-
-if TYPE_CHECKING:
-    from optuna import Trial
 
 Parameters = Mapping[str, Any]
 
@@ -63,48 +60,13 @@ class Fitted(NamedTuple):
         return self.rule.probability(features)
 
 
-class Classifier(Protocol):
-    """Fitted classifier."""
-
-    @property
-    def n_features(self) -> int:
-        """Number of features of its input."""
-        ...
-
-    @property
-    def threshold(self) -> float:
-        """Probability from which on a contact is stable."""
-        ...
-
-    def probability(self, features: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        """Return the probability of stability of each row of (n, n_features); NaN if it has NaN."""
-        ...
-
-
 class Recipe(Protocol):
-    """Way of fitting a classifier."""
-
-    @property
-    def name(self) -> str:
-        """Name on the command line."""
-        ...
+    """Way of fitting a classifier that a model file can store."""
 
     @property
     def reference(self) -> Parameters:
-        """Reference parameters, used without a search."""
+        """Reference parameters."""
         ...
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw parameters from an Optuna trial."""
-        ...
-
-    def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Classifier:
-        """Fit a classifier with a calibrated probability to the samples."""
-        ...
-
-
-class ModelRecipe(Recipe, Protocol):
-    """Way of fitting a classifier that a model file can store."""
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit a classifier with a calibrated probability to the samples."""
@@ -156,13 +118,6 @@ def class_weights(positive: npt.NDArray[np.bool_], class_weight: str | None) -> 
         return 1.0, 1.0
     n, n_positive = len(positive), int(positive.sum())
     return n / (2 * (n - n_positive)), n / (2 * n_positive)
-
-
-def undo_balancing(
-    probability: npt.NDArray[np.float64], class_ratio: float
-) -> npt.NDArray[np.float64]:
-    """Return the probability whose odds are smaller by the factor `class_ratio`."""
-    return probability / (probability + class_ratio * (1.0 - probability))
 
 
 def logistic(value: float) -> float:

@@ -1,7 +1,6 @@
 """Logistic regression, from nothing or as an adaptation of another linear classifier."""
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from msgspec.structs import replace
@@ -19,11 +18,7 @@ from holdfast.training.classifiers.fitting import (
 )
 from holdfast.training.classifiers.newton import Solution, fit_logistic
 
-if TYPE_CHECKING:
-    from optuna import Trial
-
 NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
-CHANGES = (NONE, CALIBRATION, WEIGHTS)
 """What is changed of the prior: nothing; intercept and slope of its log odds; or all weights."""
 
 
@@ -35,15 +30,7 @@ class LogisticRegression:
     factor; the decision is not changed by the correction.
     """
 
-    name: str = "logreg"
     reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw C over eight decades, and whether classes are weighted."""
-        return {
-            "C": trial.suggest_float("C", 1e-4, 1e4, log=True),
-            "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
-        }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples by Newton's method; the seed is not used.
@@ -95,35 +82,18 @@ class Adapted:
     threshold: float = 0.5
 
     @property
-    def name(self) -> str:
-        """Name of the recipe, with the prior: another prior is another search."""
-        return f"adapted {self.prior} at {self.threshold}"
-
-    @property
     def reference(self) -> Parameters:
         """Reference parameters: a cautious change of the calibration."""
         return {"change": CALIBRATION, "C": 1e-3}
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw what is changed, and C over eight decades."""
-        return {
-            "change": trial.suggest_categorical("change", CHANGES),
-            "C": trial.suggest_float("C", 1e-6, 1e2, log=True),
-        }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """The classifier adapted to the samples; deterministic, the seed is not used.
 
         Raises:
             TrainingError: the samples have only one class.
-            ValueError: the number of features is not that of the prior, or the change is
-                unknown.
+            ValueError: the number of features is not that of the prior.
         """
         del seed
-        if parameters["change"] not in CHANGES:
-            raise ValueError(
-                f"unknown change {parameters['change']!r}; there are {', '.join(CHANGES)}"
-            )
         if samples.features.shape[1] != self.prior.n_features:
             raise ValueError(
                 f"{samples.features.shape[1]} features given, {self.prior.n_features} expected "

@@ -10,7 +10,7 @@ whatever the number of samples.
 """
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,9 +33,6 @@ from holdfast.training.classifiers.newton import Solution
 SIGMOID_FOLDS = 5
 """Folds, by group, whose held-out decision values the sigmoid is fitted to."""
 
-if TYPE_CHECKING:
-    from optuna import Trial
-
 
 @dataclass(frozen=True)
 class LinearSVM:
@@ -46,15 +43,7 @@ class LinearSVM:
     else to those of the training samples (Platt 1999).
     """
 
-    name: str = "svm"
     reference: Parameters = field(default_factory=lambda: {"C": 1.0, "class_weight": "balanced"})
-
-    def suggest(self, trial: "Trial") -> Parameters:
-        """Draw C over eight decades, and whether classes are weighted."""
-        return {
-            "C": trial.suggest_float("C", 1e-5, 1e3, log=True),
-            "class_weight": trial.suggest_categorical("class_weight", ["balanced", None]),
-        }
 
     def fit(self, samples: Samples, parameters: Parameters, seed: int) -> Fitted:
         """Fit the classifier to the samples, to the minimum of its loss; the seed is not used.

@@ -11,7 +11,7 @@ from holdfast.contact import ContactState
 from holdfast.detection import Model, parse_features
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import summarise
-from holdfast.metrics.slip_thresholds import MAX_RAISED_QUIET, slip_curve
+from holdfast.metrics.slip_curves import MAX_RAISED_QUIET, slip_curve
 from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTruth
 from holdfast.training import Setting, compute_decisions, train
 from holdfast.training.classifiers.fitting import Samples
@@ -23,13 +23,13 @@ from holdfast.training.head_fits import (
     SLIP_SMOOTHING,
     fit_slip,
 )
-from holdfast.training.slip_threshold import (
+from holdfast.training.targets import TargetSamples
+from holdfast.training.thresholds import (
     SLIP_FALSE_ALARMS,
     choose_slip_threshold,
+    tune,
     with_slip_threshold,
 )
-from holdfast.training.targets import TargetSamples
-from holdfast.training.tune import tune
 
 from .build import sliding_recording, tiny_recording
 
@@ -176,7 +176,7 @@ class TestNoRule:
         sure = SlipDecisions(times, np.full(n, 1 - 1e-9), still == STILL, 0.0, truth)
         chosen = choose_slip_threshold([{"thumb": slip_curve(sure)}] * 2, [0, 1], 0)
         assert "at most 1 false alarms a minute in 2 min" in chosen.reason
-        assert rule_of(with_slip_threshold(model, chosen)) is None
+        assert rule_of(with_slip_threshold(model, chosen.point)) is None
 
     @pytest.mark.parametrize("code", [STILL, NOT_HELD])
     def test_with_too_little_held_time(self, code):
@@ -185,9 +185,9 @@ class TestNoRule:
         never = SlipDecisions(times, np.full(3000, 1e-9), codes > STILL, 0.0, truth)
         chosen = choose_slip_threshold([{"thumb": slip_curve(never)}], [0], 0)
         minutes = "0.5" if code == STILL else "0"
-        assert chosen.index is None
+        assert chosen.point is None
         assert chosen.reason.startswith(f"{minutes} min of held time given; ")
-        assert "needs at least 1 min" in chosen.reason
+        assert "need at least 1 min" in chosen.reason
         assert not chosen.metrics.threshold_chosen
 
     def test_an_adapted_model_keeps_its_rule(self, model):

@@ -1,0 +1,634 @@
+"""Thresholds of heads: the curve of a head over recordings, and the choice on it.
+
+A curve has, at each threshold, the false alarms per minute and the events that are found in time.
+`tune` makes one of labelled recordings, `train` and `teach` of decisions out of fold, `calibrate`
+of handling without labels, in which there are only alarms.
+
+All but `tune` choose the most sensitive threshold from which on all quieter ones are quiet enough:
+a lucky one beyond a bad one is not taken. `tune`, whose recordings have events of the user's own,
+takes the one with the fewest missed events among all that are quiet enough.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import takewhile
+from typing import Any, Literal, NamedTuple, Self
+
+import msgspec
+import numpy as np
+
+from holdfast.contact import STABLE, UNSTABLE
+from holdfast.detection import Choice, Debounce, FingerModel, HeadName, Model, ThresholdPoint
+from holdfast.errors import ModelError, TrainingError
+from holdfast.kernel import _extension
+from holdfast.metrics import (
+    Decisions,
+    EventMetrics,
+    FingerDecisions,
+    hand_decisions,
+    match_decisions,
+    pool_events,
+)
+from holdfast.metrics.decisions import Codes
+from holdfast.metrics.masks import runs
+from holdfast.metrics.slip_curves import (
+    MAX_RAISED_QUIET,
+    SLIP_THRESHOLDS,
+    THRESHOLDS,
+    SlipSummary,
+    ThresholdChoice,
+    choose_threshold,
+    slip_summary,
+    summarise_choice,
+)
+from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, slip_metrics
+from holdfast.recordings import Recording
+from holdfast.sensors.types import Array, Flags
+from holdfast.training.evaluation import compute_decisions
+from holdfast.training.own_handling import grasped_durations, location_and_scale
+
+COARSE_STEP = 4
+"""Every fourth threshold is looked at first."""
+USABLE_SHARE = 0.5
+"""A threshold is usable if the hand is STABLE in at least this share of the stable samples in
+which it is STABLE at the lowest threshold: a hand that is never STABLE gives no false alarm."""
+N_SHOWN = 3
+"""Thresholds that are shown on either side of the chosen one."""
+SLIP_FALSE_ALARMS = 1.0
+"""False alarms per minute of all held time of a finger for which `train` sets the threshold."""
+STABLE_SHARE = 0.95
+"""Share of the held samples of own handling that is STABLE."""
+RAISED_SHARE = 0.05
+"""Share of the held samples of own handling in which a slip may be reported."""
+MAX_DISTANCE = 3.0
+"""A threshold is at most this many scales of the log odds from their location: what is further
+away is taken for slip, and the share is not reached then."""
+HIGHEST_THRESHOLD = 0.9
+"""Highest threshold of stability that own handling sets."""
+
+TunedHead = Literal["stable", "slip"]
+Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
+Thresholds = dict[HeadName, float]
+"""Thresholds of a model on one sensor, by head."""
+
+
+@dataclass(frozen=True)
+class ThresholdReplay:
+    """Decisions about one recording, for any threshold of stability.
+
+    Attributes:
+        raw: decisions without debouncing, hold and hysteresis, at the threshold 0: what is UNSTABLE
+            then is so by its force, whatever the threshold.
+        debounce: of the model.
+        period: of the samples [s].
+        n_model_fingers: number of fingers of the model.
+    """
+
+    raw: Decisions
+    debounce: Debounce
+    period: float
+    n_model_fingers: int
+
+    @classmethod
+    def of(cls, model: Model, recording: Recording) -> Self:
+        """Compute the probabilities of a recording.
+
+        Raises:
+            ModelError: the recording has other fingers or sensors.
+        """
+        plain = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
+        raw = compute_decisions(plain, recording)
+        period = 1 / (model.rate or recording.rate)
+        return cls(raw, model.debounce, period, model.n_fingers(raw.fingers))
+
+    def hand(self, threshold: float) -> FingerDecisions:
+        """Return the decisions about the hand at a threshold."""
+        fingers = {
+            name: replace(finger, states=self.states(finger, threshold))
+            for name, finger in self.raw.fingers.items()
+        }
+        return hand_decisions(fingers, self.n_model_fingers)
+
+    def states(self, finger: FingerDecisions, threshold: float) -> Codes:
+        """Return the states of a finger at a threshold."""
+        # In C: every threshold is tried on every recording.
+        out = np.zeros(len(finger.times), dtype=np.int8)
+        rule = self.debounce
+        limits = np.array([
+            threshold, rule.hysteresis, rule.hold, rule.min_duration, self.period,
+            rule.switching_rate,
+        ])  # fmt: skip
+        times, probability = np.array(finger.times), np.array(finger.stable_probability)
+        _extension.replay(times, probability, np.array(finger.states, dtype=np.int8), limits, out)
+        return out
+
+
+class CurvePoint(msgspec.Struct, frozen=True):
+    """Errors of a head at one threshold.
+
+    Attributes:
+        threshold: of the probability.
+        false_alarms: per minute of the time that counts.
+        missed: share of the events without an alarm in time [%], by that time [s].
+        in_time: the time of `missed` that the record of a choice has.
+        n: number of events: onsets of instability of the hand, or slips of the fingers.
+        minutes: duration of the time that counts [min]: labelled stable, or held by a finger.
+        is_usable: whether it may be chosen, whatever its false alarms: the hand is STABLE often
+            enough, but not for ever; a slip is reported in at most 2 % of quiet hold.
+        events: all metrics of the hand; None for slips.
+        stable: share of the samples labelled STABLE that are decided STABLE [%]; None for slips.
+        slips: all metrics of slips; None for stability.
+    """
+
+    threshold: float
+    false_alarms: float
+    missed: dict[str, float | None]
+    in_time: str
+    n: int
+    minutes: float
+    is_usable: bool
+    events: EventMetrics | None = None
+    stable: float | None = None
+    slips: SlipMetrics | None = None
+
+    @classmethod
+    def of_hands(
+        cls, threshold: float, hands: Sequence[FingerDecisions], most: float = 0.0
+    ) -> Self:
+        """Return the point of the events of the hand, missed without an alarm in 0.2 s.
+
+        Args:
+            threshold: of the probability.
+            hands: decisions about each recording.
+            most: share of the samples labelled STABLE that are so at the lowest threshold [%].
+
+        Raises:
+            TrainingError: nothing is labelled, or not as stable.
+        """
+        labelled = [hand for hand in hands if hand.labels.any()]
+        if not labelled:
+            raise TrainingError(
+                f"none of the recordings ({len(hands)}) has labels; labels expected"
+            )
+        events = pool_events([match_decisions(hand) for hand in labelled])
+        states = np.concatenate([hand.states[hand.labels == STABLE] for hand in labelled])
+        if not events.stable_minutes or not len(states):
+            raise TrainingError(
+                "no time in which the hand is labelled stable; false alarms are counted per "
+                "minute of it"
+            )
+        stable = 100 * int((states == STABLE).sum()) / len(states)
+        # Below the hysteresis a stable contact stays stable, so that every event is missed.
+        is_usable = stable >= USABLE_SHARE * most and (events.missed["0.2"] or 0.0) < 100
+        return cls(
+            threshold, events.false_alarms_per_minute or 0.0, events.missed, "0.2",
+            events.n_events, events.stable_minutes, is_usable, events=events, stable=stable,
+        )  # fmt: skip
+
+    @classmethod
+    def of_slips(cls, threshold: float, counts: SlipCounts) -> Self:
+        """Return the point of the slips of fingers, missed without an alarm in 0.1 s."""
+        slips = slip_metrics(counts)
+        missed = {t: None if found is None else 100 - found for t, found in slips.incipient.items()}
+        return cls(
+            threshold, slips.false_alarms_per_minute["held"] or 0.0, missed, "0.1",
+            slips.n, slips.held_minutes, (slips.raised_quiet or 0.0) <= MAX_RAISED_QUIET,
+            slips=slips,
+        )  # fmt: skip
+
+    @property
+    def scores(self) -> SlipMetrics | dict[str, Any]:
+        """What a document has of the point."""
+        stable = {"threshold": self.threshold, "stable": self.stable, "events": self.events}
+        return stable if self.slips is None else self.slips
+
+    def cost(self, false_alarms: float) -> tuple[float, ...]:
+        """Return what the best point has least of.
+
+        Few enough false alarms come first, then few missed events (the sum over all times within
+        which they are counted), then few false alarms.
+        """
+        excess = max(self.false_alarms - false_alarms, 0.0)
+        missed = sum(share or 0.0 for share in self.missed.values())
+        return excess, missed, self.false_alarms if self.n else 0.0
+
+    def choice(
+        self,
+        requested: float,
+        recordings: Mapping[str, str] = {},
+        points: "Sequence[CurvePoint]" = (),
+    ) -> Choice:
+        """Return the record of a choice of this threshold, for the model file."""
+        missed = self.missed[self.in_time]
+        return Choice(
+            requested=requested,
+            false_alarms_per_minute=self.false_alarms,
+            found=None if missed is None else 100 - missed,
+            n=self.n,
+            minutes=self.minutes,
+            recordings=dict(recordings),
+            points=tuple(
+                ThresholdPoint(p.threshold, round(p.false_alarms, 3), p.missed[p.in_time])
+                for p in points
+            ),
+        )
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Errors of a head on recordings, at thresholds of its probability.
+
+    Attributes:
+        thresholds: from the quietest to the most sensitive.
+        at: returns the point of a threshold.
+    """
+
+    thresholds: Sequence[float]
+    at: Callable[[float], CurvePoint]
+
+    @classmethod
+    def of_stability(cls, model: Model, recordings: Iterable[Recording]) -> Self:
+        """Return the curve of the onsets of instability of the hand.
+
+        The decision rule is replayed at each threshold, with contact, hysteresis, hold and minimum
+        duration.
+
+        Raises:
+            TrainingError: nothing is labelled, or not as stable.
+            ModelError: the hand is never STABLE.
+        """
+        replays = [ThresholdReplay.of(model, recording) for recording in recordings]
+
+        def at(threshold: float, most: float = 0.0) -> CurvePoint:
+            hands = [replay.hand(threshold) for replay in replays]
+            return CurvePoint.of_hands(threshold, hands, most)
+
+        most = at(float(THRESHOLDS[0])).stable or 0.0
+        if most == 0:
+            raise ModelError(
+                "the model cannot be tuned: the hand is never STABLE at any threshold while it is "
+                "labelled stable (see holdfast detect --summary)"
+            )
+
+        return cls(THRESHOLDS.tolist(), partial(at, most=most))
+
+    @classmethod
+    def of_slips(cls, model: Model, recordings: Iterable[Recording]) -> Self:
+        """Return the curve of the slips of all fingers.
+
+        Raises:
+            ModelError: the model has no slip rule.
+            TrainingError: no slips are known.
+        """
+        if not model.has_slip_rule:
+            raise ModelError(
+                f"{model.name or 'the model'} has no slip rule; train one on recordings whose "
+                "slips are known"
+            )
+        known = [compute_decisions(model, recording).known_slips for recording in recordings]
+        counters = [(slip, SlipCounter.of(slip)) for slips in known for slip in slips.values()]
+        if not counters:
+            raise TrainingError(f"{len(known)} recordings without slips that are known")
+
+        def at(threshold: float) -> CurvePoint:
+            only = np.array([threshold])
+            counts = [counter.count(slip.raised_at(only))[0] for slip, counter in counters]
+            return CurvePoint.of_slips(threshold, SlipCounts.total(counts))
+
+        return cls(SLIP_THRESHOLDS[::-1].tolist(), at)
+
+    def choose(self, false_alarms: float) -> tuple[CurvePoint, list[CurvePoint]]:
+        """Return the best point with few enough false alarms, and all usable points in order.
+
+        Raises:
+            TrainingError: no point has few enough false alarms.
+        """
+
+        def best_of(points: list[CurvePoint]) -> CurvePoint:
+            # Without events the most sensitive is the best.
+            order = 1 if points[0].n else -1
+            ordered = sorted(points, key=lambda p: order * self.thresholds.index(p.threshold))
+            return min(ordered, key=lambda point: point.cost(false_alarms))
+
+        points = self._usable(self.thresholds[::COARSE_STEP])
+        best = best_of(points)
+        if best.false_alarms > false_alarms:
+            missed = best.missed[best.in_time]
+            misses = f"misses {missed or 0:.0f} % of {best.n} within {best.in_time} s"
+            raise TrainingError(
+                f"no threshold gives at most {false_alarms:g} false alarms a minute on these "
+                f"recordings; the least is {best.false_alarms:.2g} at the threshold "
+                f"{best.threshold:.3g}, which {misses if best.n else 'has no event to miss'}"
+            )
+        # All neighbours up to the next threshold that was looked at on either side.
+        index = self.thresholds.index(best.threshold)
+        around = self.thresholds[max(index - COARSE_STEP + 1, 0) : index + COARSE_STEP]
+        points += self._usable([t for t in around if t != best.threshold])
+        return best_of(points), sorted(points, key=lambda point: point.threshold)
+
+    def _usable(self, thresholds: Sequence[float]) -> list[CurvePoint]:
+        points = [self.at(threshold) for threshold in thresholds]
+        return [point for point in points if point.is_usable] or points
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """Result of tuning.
+
+    Attributes:
+        model: with the chosen threshold.
+        chosen: its errors.
+        before: errors of the model that was given.
+        points: thresholds around it, lowest first; the chosen one is among them.
+    """
+
+    model: Model
+    chosen: CurvePoint
+    before: CurvePoint
+    points: tuple[CurvePoint, ...]
+
+    def document(self) -> dict[str, Any]:
+        """Return the chosen threshold, with the errors before it and around it, for JSON."""
+        around = [
+            {"threshold": point.threshold, **msgspec.to_builtins(point.scores)}
+            for point in self.points
+        ]
+        return ({} if self.chosen.slips is None else {"for": "slip"}) | {
+            "threshold": self.chosen.threshold,
+            "chosen": self.chosen.scores,
+            "before": self.before.scores,
+            "around": around,
+        }
+
+
+def tune(
+    model: Model,
+    recordings: Iterable[Recording],
+    false_alarms: float,
+    head: TunedHead = "stable",
+    *,
+    progress: Steps = lambda recordings: recordings,
+) -> Tuned:
+    """Choose the threshold of a head for a rate of false alarms.
+
+    The probabilities are computed once, and the decisions replayed for every threshold: of
+    stability, with contact, hysteresis, hold and minimum duration.
+
+    Args:
+        model: to tune.
+        recordings: labelled; of slips, with a truth or labels of slips.
+        false_alarms: maximum number per minute of stable label of the hand; of slips, per minute
+            of held time of one finger.
+        head: whose threshold is chosen.
+        progress: iterates over the recordings.
+
+    Raises:
+        ValueError: the rate is negative or not finite; of slips, not above 0.
+        TrainingError: the recordings have no labels, no time that counts, too little of it for
+            the rate, or no threshold gives so few false alarms.
+        ModelError: the model has no such head, or is never STABLE; or a recording has other
+            fingers or sensors.
+    """
+    is_slip = head == "slip"
+    if not math.isfinite(false_alarms) or false_alarms < 0 or (is_slip and false_alarms == 0):
+        least = "above 0" if is_slip else "of at least 0"
+        raise ValueError(f"false alarms per minute {least} expected, {false_alarms:g} given")
+    digests: dict[str, str] = {}
+    highest = 0.0
+
+    def read() -> Iterator[Recording]:
+        nonlocal highest
+        for recording in progress(recordings):
+            digests[recording.name] = recording.readings_digest
+            sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
+            heads = [model.finger(*finger).head(head) for finger in sensors.items()]
+            highest = max([highest, *(known.threshold for known in heads if known is not None)])
+            yield recording
+
+    curve = (Curve.of_slips if is_slip else Curve.of_stability)(model, read())
+    before = curve.at(highest)
+    if is_slip and (refusal := too_short(before.minutes, false_alarms)):
+        raise TrainingError(refusal)
+    chosen, points = curve.choose(false_alarms)
+    index = points.index(chosen)
+    shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
+    # The live page shows the errors at any threshold of stability.
+    choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
+    tuned = model.with_threshold(head, chosen.threshold, choice)
+    name = f"{model.name}, tuned" if model.name else ""
+    return Tuned(msgspec.structs.replace(tuned, name=name), chosen, before, tuple(shown))
+
+
+def too_short(minutes: float, false_alarms: float) -> str:
+    """Return why a held time is too short to choose a threshold of slips by; empty if it is not."""
+    if minutes * false_alarms >= 1:
+        return ""
+    return (
+        f"{minutes:.2g} min of held time given; {false_alarms:g} false alarms a minute need at "
+        f"least {1 / false_alarms:.2g} min"
+    )
+
+
+class SlipThreshold(NamedTuple):
+    """Threshold of the slip rules of a model, chosen out of fold.
+
+    Attributes:
+        point: errors of all recordings at this threshold; None if none has few enough false alarms.
+        metrics: each recording by the threshold of the others; None if no slips are known.
+        reason: why there is no threshold; empty if there is one.
+    """
+
+    point: CurvePoint | None
+    metrics: SlipSummary | None
+    reason: str = ""
+
+
+def choose_slip_threshold(
+    curves: Sequence[Mapping[str, SlipCounts]], groups: Sequence[int], seed: int
+) -> SlipThreshold:
+    """Choose the threshold of slips from decisions out of fold.
+
+    Args:
+        curves: of each finger, of each recording.
+        groups: unit of each recording; the threshold of its metrics is chosen without it.
+        seed: of the bootstrap.
+    """
+    used = [(fingers, unit) for fingers, unit in zip(curves, groups, strict=True) if fingers]
+    if not used:
+        return SlipThreshold(None, None, "no decision about a slip out of fold")
+    known, units = [fingers for fingers, _ in used], [unit for _, unit in used]
+    pooled = SlipCounts.total([SlipCounts.total(fingers.values()) for fingers in known])
+    choice = ThresholdChoice(SLIP_FALSE_ALARMS)
+    index = choose_threshold(pooled, choice)
+    if len(set(units)) > 1:
+        metrics = summarise_choice(known, choice, groups=units, seed=seed)
+    else:
+        shown = len(SLIP_THRESHOLDS) - 1 if index is None else index
+        metrics = slip_summary([{name: of[shown] for name, of in f.items()} for f in known])
+    minutes = pooled.held_seconds / 60
+    if (reason := too_short(minutes, SLIP_FALSE_ALARMS)) or index is None:
+        return SlipThreshold(None, metrics, reason or (
+            f"no threshold of slips has at most {SLIP_FALSE_ALARMS:g} false alarms a minute in "
+            f"{minutes:.2g} min of held time"
+        ))  # fmt: skip
+    return SlipThreshold(CurvePoint.of_slips(float(SLIP_THRESHOLDS[index]), pooled[index]), metrics)
+
+
+def with_slip_threshold(model: Model, point: CurvePoint | None) -> Model:
+    """Return the model whose slip rules have a threshold; without slip rules if there is none."""
+    if point is None:
+        return model.changed(
+            lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
+        )
+    return model.with_threshold("slip", point.threshold, point.choice(SLIP_FALSE_ALARMS))
+
+
+@dataclass(frozen=True, eq=False)
+class GraspingFinger:
+    """One finger of one recording of own handling, decided with any threshold.
+
+    Attributes:
+        name: of the finger.
+        replay: of the recording.
+        grasped: (n,) True where the finger holds something.
+    """
+
+    name: str
+    replay: ThresholdReplay
+    grasped: Flags
+
+    @property
+    def decisions(self) -> FingerDecisions:
+        """Decisions about the finger without debouncing."""
+        return self.replay.raw.fingers[self.name]
+
+    def probability(self, head: TunedHead) -> Array:
+        """Return the probability of a head in the held samples; none without a slip rule."""
+        slip = self.decisions.slip
+        if head == "stable":
+            return self.decisions.stable_probability[self.grasped]
+        return np.empty(0) if slip is None else slip.probability[self.grasped]
+
+    def decided(self, head: TunedHead, threshold: float) -> Flags:
+        """Return (n,) the held samples that are STABLE, or in which a slip is reported."""
+        slip = self.decisions.slip
+        if head == "stable":
+            return (
+                np.asarray(self.replay.states(self.decisions, threshold) == STABLE) & self.grasped
+            )
+        if slip is None:
+            return np.zeros_like(self.grasped)
+        return np.asarray(slip.raised_at(np.array([threshold]))[0] & self.grasped)
+
+    def n_alarms(self, head: TunedHead, threshold: float) -> int:
+        """Return the number of alarms: reported slips, or UNSTABLE between STABLE and STABLE.
+
+        An alarm that ends with the release of the object is right in ordinary handling.
+        """
+        if head == "slip":
+            return len(runs(self.decided(head, threshold)))
+        states = self.replay.states(self.decisions, threshold)
+        spells = runs(states == UNSTABLE)
+        inside = [(a, b) for a, b in spells if self.grasped[a] and a > 0 and b < len(states)]
+        return sum(bool(states[a - 1] == states[b] == STABLE) for a, b in inside)
+
+
+@dataclass(frozen=True, eq=False)
+class GraspingFingers:
+    """All fingers of one sensor in own handling."""
+
+    fingers: Sequence[GraspingFinger]
+
+    @property
+    def seconds(self) -> float:
+        """Held time of the finger that holds longest [s]."""
+        totals: dict[str, float] = {}
+        for finger in self.fingers:
+            held = grasped_durations(finger.decisions.times)[finger.grasped]
+            totals[finger.name] = totals.get(finger.name, 0.0) + float(held.sum())
+        return max(totals.values(), default=0.0)
+
+    def share(self, head: TunedHead, threshold: float) -> float:
+        """Return the share of the held samples that are STABLE, or in which a slip is reported."""
+        n_grasped = sum(int(finger.grasped.sum()) for finger in self.fingers)
+        n = sum(int(finger.decided(head, threshold).sum()) for finger in self.fingers)
+        return n / max(n_grasped, 1)
+
+    def alarms_per_minute(self, head: TunedHead, threshold: float) -> float:
+        """Return the number of alarms of all fingers per minute of held time."""
+        return 60 * sum(finger.n_alarms(head, threshold) for finger in self.fingers) / self.seconds
+
+    def probability_at(self, head: TunedHead, distance: float) -> float:
+        """Return the probability at so many scales of its log odds from their location."""
+        known = np.concatenate([np.empty(0), *(f.probability(head) for f in self.fingers)])
+        bounded = np.clip(known, 1e-12, 1 - 1e-12)  # they may be 0 or 1
+        location, scale = location_and_scale(np.log(bounded / (1 - bounded))[:, None])
+        return float(1 / (1 + math.exp(-(location[0] + distance * scale[0]))))
+
+    def choose(self, head: TunedHead, default: float, false_alarms: float | None) -> float:
+        """Return the most sensitive threshold that is quiet, as all quieter ones are.
+
+        Args:
+            head: whose threshold is chosen.
+            default: the most sensitive threshold.
+            false_alarms: maximum number a minute; None for the share of quiet samples, of which
+                the quietest near threshold falls short where none has it.
+
+        Raises:
+            TrainingError: no threshold gives so few alarms.
+        """
+        # Quieter are lower thresholds of stability, and higher ones of a slip.
+        sign = 1 if head == "stable" else -1
+        quieter = THRESHOLDS[sign * THRESHOLDS < sign * default][::sign]
+        thresholds: list[float] = [*quieter.tolist(), default]
+        if false_alarms is None:
+            furthest = sign * self.probability_at(head, -sign * MAX_DISTANCE)
+            near = [t for t in thresholds if sign * t >= furthest] or [default]
+            limit = STABLE_SHARE if head == "stable" else -RAISED_SHARE
+            quiet = takewhile(lambda t: sign * self.share(head, t) >= limit, near)
+            return [near[0], *quiet][-1]
+        # Beyond the first that alarms too often alarms may be fewer again, as a finger that is
+        # never STABLE has none.
+        quiet = takewhile(lambda t: self.alarms_per_minute(head, t) <= false_alarms, thresholds)
+        if chosen := list(quiet):
+            return chosen[-1]
+        least = min(self.alarms_per_minute(head, t) for t in thresholds)
+        kind = "alarms" if head == "stable" else "reported slips"
+        raise TrainingError(
+            f"no threshold gives at most {false_alarms:g} {kind} a minute of this handling; the "
+            f"least is {least:.2g}"
+        )
+
+
+def choose_handling_thresholds(
+    handling: GraspingFingers,
+    part: FingerModel,
+    false_alarms: float | None = None,
+    *,
+    moves: bool = False,
+) -> Thresholds:
+    """Choose the thresholds of a model on own handling.
+
+    The threshold of stability is at most that of the model, the threshold of slips at least:
+    handling that is still says nothing about motion, so it is no reason to alarm more. Handling
+    in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there
+    it is the most sensitive at which enough held samples are quiet: `STABLE_SHARE` of them STABLE,
+    a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which
+    there are at most so many alarms of either kind.
+
+    Args:
+        handling: decided with its own location and scale.
+        part: model of the fingers, with the thresholds of the model.
+        false_alarms: maximum number of alarms a minute of held time; None for the shares.
+        moves: whether the arm moves in the handling.
+
+    Raises:
+        TrainingError: no threshold gives so few alarms of a kind.
+    """
+    default = max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0)
+    chosen: Thresholds = {"stable": handling.choose("stable", default, false_alarms)}
+    if part.slip is not None:
+        chosen["slip"] = handling.choose("slip", part.slip.threshold, false_alarms)
+    return chosen

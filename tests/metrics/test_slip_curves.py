@@ -1,0 +1,221 @@
+"""Choice of the threshold of slips, and intervals that include it."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.metrics.slip_curves import (
+    SLIP_THRESHOLDS,
+    ThresholdChoice,
+    choose_threshold,
+    held_out_indices,
+    slip_curve,
+    slip_intervals,
+    slip_summary,
+    summarise_choice,
+)
+from holdfast.metrics.slip_truth import NOT_HELD, SlipDecisions
+from holdfast.metrics.slips import SlipCounts, count_slips, slip_metrics
+
+from .slips import RATE, decisions, slip
+
+
+def random_recording(seed, n_false):
+    """Return decisions with random probabilities: high in a slip and in some still samples."""
+    generator = np.random.default_rng(seed)
+    made = decisions([], [slip()], seconds=20)
+    probability = generator.uniform(0.0, 0.3, len(made.times))
+    probability[500:600] = generator.uniform(0.6, 0.95)
+    for start in generator.integers(700, 1900, n_false):
+        probability[start] = generator.uniform(0.5, 0.9)
+    return SlipDecisions(made.times, probability, made.raised, 0.0, made.truth)
+
+
+CHOICE = ThresholdChoice(1.0)
+
+
+def held_out(curves, groups):
+    """Return the index for each recording, chosen without its group from those that are there."""
+    (indices,) = held_out_indices(curves, CHOICE, groups, np.ones((1, len(curves))))
+    return indices
+
+
+class TestThresholds:
+    curves = tuple(slip_curve(random_recording(seed, seed % 4)) for seed in range(8))
+
+    def test_the_lowest_that_fits_is_chosen(self):
+        total = SlipCounts.total(self.curves)
+        index = choose_threshold(total, CHOICE)
+        rates = [60 * counts.false_held / counts.held_seconds for counts in total]
+        assert rates[index] <= 1.0
+        assert rates[index - 1] > 1.0
+        assert all(rate <= 1.0 for rate in rates[index:])
+
+    def test_false_alarms_are_counted_in_held_time_or_in_quiet_hold_alone(self):
+        total = SlipCounts.total(self.curves)
+        pushed = replace(total, false_held=total.false_held + 99)
+        assert choose_threshold(pushed, CHOICE) is None
+        index = choose_threshold(pushed, ThresholdChoice(1.0, "quiet"))
+        rates = [60 * counts.false_quiet / counts.quiet_seconds for counts in total]
+        raised = [counts.raised_seconds / counts.quiet_seconds for counts in total]
+        assert rates[index] <= 1.0
+        assert rates[index - 1] > 1.0 or raised[index - 1] > 0.02
+
+    def test_a_summary_has_the_threshold_of_other_recordings_or_of_other_groups(self):
+        tested, training = (
+            [{"thumb": c} for c in part] for part in (self.curves[:4], self.curves[4:])
+        )
+        for choice in (ThresholdChoice(1.0), ThresholdChoice(-1.0)):  # the second allows nothing
+            index = choose_threshold(SlipCounts.total(self.curves[4:]), choice)
+            summary = summarise_choice(tested, choice, training=training)
+            assert summary.threshold_chosen and summary.intervals is not None
+            counts = SlipCounts.total(self.curves[:4])[-1 if index is None else index]
+            assert summary.pooled == summary.fingers["thumb"] == slip_metrics(counts)
+        groups = [0, 0, 1, 1]
+        indices = held_out(self.curves[:4], groups)
+        counts = SlipCounts.total(c[k] for c, k in zip(self.curves, indices, strict=False))
+        summary = summarise_choice(tested, ThresholdChoice(1.0), groups=groups)
+        assert summary.pooled == slip_metrics(counts)
+
+    def test_a_curve_is_the_counts_at_each_threshold(self):
+        slips = [slip(), slip(8.0, 8.3, gross=8.1, reached=(8.05, math.nan))]
+        made = replace(
+            decisions([], slips, seconds=20),
+            probability=random_recording(5, 9).probability,
+            hold=0.2,
+        )
+        for index in (40, 60, 80, 90):
+            (raised,) = made.raised_at(SLIP_THRESHOLDS[[index]])
+            expected = vars(count_slips(replace(made, raised=raised)))
+            counts = vars(slip_curve(made)[index])
+            assert raised.any()
+            assert {name: np.asarray(value).tolist() for name, value in counts.items()} == {
+                name: np.asarray(value).tolist() for name, value in expected.items()
+            }
+
+    def test_none_if_no_threshold_fits(self):
+        probability = np.ones(1000)
+        made = SlipDecisions(
+            np.arange(1000) / RATE, probability, probability > 0, 0.0, decisions([]).truth
+        )
+        assert choose_threshold(slip_curve(made), CHOICE) is None
+
+    def test_a_recording_is_scored_by_the_threshold_of_the_others(self):
+        indices = held_out(self.curves, range(8))
+        for own, index in enumerate(indices):
+            others = [curve for k, curve in enumerate(self.curves) if k != own]
+            total = SlipCounts.total(others)
+            assert index == choose_threshold(total, CHOICE)
+
+    @pytest.mark.parametrize("groups", [range(8), (0, 0, 1, 1, 2, 2, 3, 3)])
+    def test_intervals_with_the_choice_are_of_recordings_left_out(self, groups):
+        indices = held_out(self.curves, groups)
+        scored = [curve[index] for curve, index in zip(self.curves, indices, strict=True)]
+        point = slip_metrics(SlipCounts.total(scored))
+        recordings = [{"thumb": curve} for curve in self.curves]
+        found = summarise_choice(recordings, CHOICE, groups=groups).intervals
+        low, high = found.false_alarms_per_minute["held"]
+        assert low <= point.false_alarms_per_minute["held"] <= high
+        assert high > 1.0  # the rate that was asked for holds in sample only
+        low, high = found.incipient["0.1"]
+        assert low <= point.incipient["0.1"] <= high
+
+    def test_a_single_group_gets_the_highest_threshold(self):
+        indices = held_out(self.curves[:2], (0, 0))
+        assert indices.tolist() == [len(SLIP_THRESHOLDS) - 1] * 2
+
+    def test_no_threshold_where_nothing_is_held(self):
+        codes = np.full(1000, NOT_HELD, dtype=np.int8)
+        assert choose_threshold(slip_curve(decisions([], codes=codes)), CHOICE) is None
+
+    def test_intervals_without_a_choice_are_those_of_the_threshold(self):
+        single = [curve[60].as_curve for curve in self.curves]
+        found = slip_intervals(single, n=200)
+        summary = slip_summary([{"thumb": curve[0]} for curve in single], found)
+        low, high = found.incipient["0.1"]
+        assert low <= summary.pooled.incipient["0.1"] <= high
+        assert summary.intervals == found
+
+    def test_intervals_at_the_threshold_of_training_recordings(self):
+        """Equal training recordings give the same threshold in every resample."""
+        tested = [{"thumb": curve} for curve in self.curves[:4]]
+        index = choose_threshold(self.curves[5], CHOICE)
+        same = [{"thumb": self.curves[5]}] * 3
+        found = summarise_choice(tested, CHOICE, training=same).intervals
+        assert found == slip_intervals([curve[index].as_curve for curve in self.curves[:4]])
+        varied = [{"thumb": curve} for curve in self.curves[4:]]
+        assert summarise_choice(tested, CHOICE, training=varied).intervals != found
+
+    def test_no_interval_of_one_recording(self):
+        assert slip_intervals(self.curves[:1]) is None
+
+
+def in_use(curve, rate):
+    return choose_threshold(curve, ThresholdChoice(rate, "use"))
+
+
+class TestRateInUse:
+    @staticmethod
+    def curve(quiet, disturbed, quiet_minutes=6.0, disturbed_minutes=4.0):
+        """Return counts whose false alarms fall by a half from threshold to threshold."""
+        n = len(SLIP_THRESHOLDS)
+        minutes = quiet_minutes + disturbed_minutes
+        falls = 0.5 ** np.arange(n)
+        return replace(
+            SlipCounts.total([]), quiet_seconds=60 * quiet_minutes, held_seconds=60 * minutes,
+            delays=np.empty((n, 0)), gross_delays=np.empty((n, 0)), found_before=np.zeros((n, 2)),
+            false_quiet=quiet * falls, false_held=(quiet + disturbed) * falls,
+            raised_seconds=np.zeros(n), false_impacts=np.zeros(n, dtype=np.int64),
+        )  # fmt: skip
+
+    def test_disturbed_time_counts_with_its_own_share_below_that_of_use(self):
+        # 9 + 3 false alarms in 8 minutes.
+        curve = self.curve(9.0, 3.0, 6.0, 2.0)
+        assert [in_use(curve, rate) for rate in (1.5, 1.4)] == [0, 1]
+        assert [choose_threshold(curve, ThresholdChoice(rate)) for rate in (1.5, 1.4)] == [0, 1]
+
+    def test_disturbed_time_counts_with_the_share_of_use_above_it(self):
+        # 0.6 * 2 / 2 + 0.4 * 16 / 8 = 1.4 a minute; all held time has 1.8.
+        curve = self.curve(2.0, 16.0, 2.0, 8.0)
+        assert [in_use(curve, rate) for rate in (1.4, 1.3, 0.6)] == [0, 1, 2]
+        assert choose_threshold(curve, ThresholdChoice(1.4)) == 1
+
+    @pytest.mark.parametrize("minutes", [(10.0, 0.0), (0.0, 10.0)])
+    def test_only_one_of_the_two_counts_alone(self, minutes):
+        curve = self.curve(20.0 * (minutes[0] > 0), 20.0 * (minutes[1] > 0), *minutes)
+        assert [in_use(curve, rate) for rate in (2.0, 1.9)] == [0, 1]
+
+    def test_what_is_raised_in_quiet_hold_stays_under_two_percent(self):
+        curve = self.curve(0.0, 0.0)
+        raised = np.where(np.arange(len(curve)) < 5, 7.3, 7.1)  # of 360 s
+        assert in_use(replace(curve, raised_seconds=raised), 1.0) == 5
+
+    def test_none_fits(self):
+        assert in_use(self.curve(6.0, 8.0), 1e-80) is None
+        assert in_use(self.curve(0.0, 0.0, 0.0, 0.0), 1.0) is None
+
+    @given(
+        rate=st.floats(0.1, 20.0), seed=st.integers(0, 99),
+        minutes=st.tuples(st.floats(0.0, 9.0), st.floats(0.1, 9.0)),
+    )  # fmt: skip
+    @settings(max_examples=50)
+    def test_as_the_slow_twin(self, rate, seed, minutes):
+        """Its rates go up and down, so that some low thresholds are lucky."""
+        generator, curve = np.random.default_rng(seed), self.curve(20.0, 20.0, *minutes)
+        quiet = curve.false_quiet * generator.uniform(0, 2, len(curve)) * (minutes[0] > 0)
+        disturbed = generator.uniform(0, 40, len(curve)) / np.arange(1, len(curve) + 1)
+        curve = replace(curve, false_quiet=quiet, false_held=quiet + disturbed)
+        expected = None
+        for k in reversed(range(len(curve))):
+            share = min(minutes[1] / sum(minutes), 0.4) if minutes[0] else 1.0
+            found = share * disturbed[k] / minutes[1]
+            if minutes[0]:
+                found += (1 - share) * quiet[k] / minutes[0]
+            if found > rate:
+                break
+            expected = k
+        assert in_use(curve, rate) == expected
