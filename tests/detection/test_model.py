@@ -32,7 +32,6 @@ from holdfast.detection import (
     detect,
     parse_features,
 )
-from holdfast.detection.model_files import encode
 from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.errors import ModelError, OutputError
 from holdfast.sensors import sensor as built_in_sensor
@@ -78,7 +77,7 @@ class TestSaveAndLoad:
     def test_a_copy_has_the_same_bytes(self, hand_model, tmp_path):
         """As one that another process returns."""
         copy = pickle.loads(pickle.dumps(hand_model))
-        assert encode(copy) == encode(hand_model)
+        assert copy.encoded() == hand_model.encoded()
         assert copy.digest == Model.load(saved(copy, tmp_path / "m.json")).digest
 
     def test_numbers_of_numpy(self, tmp_path):
@@ -397,7 +396,7 @@ def test_a_large_file_and_a_pipe_are_refused_at_once(tmp_path):
 
 
 def test_the_ranges_of_an_older_model_are_called_limits(tmp_path):
-    text = encode(Model.load("builtin:twin")).replace(b'"range":[', b'"limits":[')
+    text = Model.load("builtin:twin").encoded().replace(b'"range":[', b'"limits":[')
     assert b'"limits":[' in text
     (tmp_path / "older.json").write_bytes(text)
     older = Model.load(tmp_path / "older.json")
