@@ -1,4 +1,4 @@
-"""The model of a finger: heads, each an answer from a rule over features; contact and debouncing."""
+"""The model of a finger: heads, each an answer from a rule over features, contact, debouncing."""
 
 import math
 from typing import Literal, Self
