@@ -56,7 +56,8 @@ def test_json_of_a_recording(capsys, path, grasp):
     assert thumb.pop("labels") == pytest.approx(labels)
     assert thumb == {
         "sensor": "uskin-curved", "n_taxels": 30, "unit": "count", "n_samples": n, "gaps": 0,
-        "rate": pytest.approx(150.0), "repeats": 0, "drift": None, "faults": {},
+        "step": None, "rests_at_zero": False, "rate": pytest.approx(150.0),
+        "repeats": 0, "drift": None, "faults": {},
     }  # fmt: skip
 
 
