@@ -56,9 +56,18 @@ def test_json_of_a_recording(capsys, path, grasp):
     assert thumb.pop("labels") == pytest.approx(labels)
     assert thumb == {
         "sensor": "uskin-curved", "n_taxels": 30, "unit": "count", "n_samples": n, "gaps": 0,
-        "step": None, "rests_at_zero": False, "rate": pytest.approx(150.0),
-        "repeats": 0, "drift": None, "faults": {},
+        "rate": pytest.approx(150.0), "repeats": 0, "drift": None, "faults": {},
     }  # fmt: skip
+
+
+def test_step_and_rest_are_shown_where_they_are_known(capsys, tmp_path):
+    readings = np.zeros((200, 87, 3))
+    thumb = Tactile(sensor("orca-finger"), np.arange(200) / 100, readings)
+    save_recording(Recording("made", {"thumb": thumb}), tmp_path / "made.parquet")
+    thumb = info_json(capsys, tmp_path / "made.parquet")["modules"]["thumb"]
+    assert (thumb["unit"], thumb["step"], thumb["rests_at_zero"]) == ("N", 0.1, True)
+    assert main(["info", str(tmp_path / "made.parquet")]) == 0
+    assert re.search(r"thumb +orca-finger +87 +0\.1 N ", capsys.readouterr().out)
 
 
 def test_gaps_repeats_and_faults(capsys, tmp_path):

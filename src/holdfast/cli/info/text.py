@@ -57,7 +57,7 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
         header,
         [
             (name, m["sensor"], m["n_taxels"],
-             m["unit"] if m["step"] is None else f"{m['step']:g} {m['unit']}",
+             f"{m['step']:g} {m['unit']}" if "step" in m else m["unit"],
              m["n_samples"], f"{m['rate']:.1f}", m["gaps"], m["repeats"])
             for name, m in modules.items()
         ],
