@@ -133,8 +133,9 @@ class Tactile:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
         unit = self.unit or self.sensor.unit
-        if unit != self.sensor.unit:  # calibrated: the range is that of raw readings
-            object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, range=None))
+        if unit != self.sensor.unit:  # calibrated: range, step and rest are those of raw readings
+            raw = replace(self.sensor, unit=unit, range=None, step=None, rests_at_zero=False)
+            object.__setattr__(self, "sensor", raw)
         object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
         if labels:

@@ -160,6 +160,8 @@ MESSAGES = [
     ("simulate new --faults field=3,rust=1", "--faults", "'rust=1'", "zero-share"),
     ("simulate new --faults drift", "--faults drift", "a number"),
     ("simulate new --faults drift=-1", "drift", "-1"),
+    ("simulate new --sensor gtac", "'gtac'", "uskin-curved, orca-finger"),
+    ("simulate new --sensor orca-thumb --faults drift=1", "uskin-curved", "orca-thumb"),
     ("simulate kept", "kept"),
     ("export builtin:any model.h --sensor gtac", "--like RECORDING", "--fingers N"),
     ("export builtin:any model.h --like none.parquet", "none.parquet"),

@@ -80,6 +80,13 @@ class TestSaveAndLoad:
         assert copy.encoded() == hand_model.encoded()
         assert copy.digest == Model.load(saved(copy, tmp_path / "m.json")).digest
 
+    def test_step_and_rest_of_a_sensor_are_kept(self, tmp_path):
+        plain = Model(fingers={ANY_FINGER: finger_model()}, sensors={"thumb": sensor()})
+        assert b'"step"' not in encode(plain)
+        stepped = {"thumb": replace(sensor(), step=0.5, rests_at_zero=True)}
+        loaded = Model.load(saved(msgspec.structs.replace(plain, sensors=stepped), tmp_path / "m"))
+        assert loaded.sensors == stepped
+
     def test_numbers_of_numpy(self, tmp_path):
         rule = Linear((np.float64(1.5),), (2.0,), ((3.0,),), (np.float64(0.25),))
         hand_model = Model(fingers={ANY_FINGER: finger_model((FeatureSpec("F_x"),), rule=rule)})
