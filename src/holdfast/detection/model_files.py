@@ -83,6 +83,7 @@ def facts_of(model: "Model") -> dict[str, Any]:
     if model.training is not None:
         training = msgspec.to_builtins(model.training)
         training["recordings"] = list(model.training.recordings)
+        training.pop("blocks", None)
     return {
         "name": model.name,
         "rate": model.rate,
@@ -113,7 +114,12 @@ def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
     """
     if str(path).startswith("builtin:"):
         raise OutputError(f"{path} is the name of a built-in model; a file expected")
-    write_whole(path, msgspec.json.format(encode(model), indent=1) + b"\n", force=force)
+    write_whole(path, file_text(model), force=force)
+
+
+def file_text(model: "Model") -> bytes:
+    """Return the text of a model file."""
+    return msgspec.json.format(encode(model), indent=1) + b"\n"
 
 
 def encode(model: "Model") -> bytes:
