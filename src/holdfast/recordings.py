@@ -11,6 +11,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.blocks import Digests, module_blocks
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.sensors import Sensor
@@ -359,6 +360,16 @@ class Recording:
         """Hash of the readings of all modules, without times and names: copies have the same."""
         parts = sorted(module.readings_digest for module in self.modules.values())
         return hashlib.blake2b("".join(parts).encode(), digest_size=16).hexdigest()
+
+    @cached_property
+    def blocks(self) -> Digests:
+        """Digests of the blocks of all modules, in order of time: parts of it have some of them.
+
+        Times, labels and names of modules do not count ([blocks][holdfast.blocks]).
+        """
+        modules = [module_blocks(module.readings) for module in self.modules.values()]
+        shares = [np.arange(len(blocks)) / max(len(blocks), 1) for blocks in modules]
+        return np.concatenate(modules)[np.argsort(np.concatenate(shares), kind="stable")]
 
     def check_modules_differ(self) -> None:
         """Check that no two modules have the same readings, unless these never change.

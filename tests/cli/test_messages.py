@@ -9,6 +9,7 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import app
+from holdfast.contact import Cause
 from holdfast.io import save_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.recordings import Recording, Tactile
@@ -128,6 +129,7 @@ MESSAGES = [
     ("train gone -o new.json", "gone"),
     ("train bare -o new.json", "labels"),
     ("train data -o kept.json", "kept.json exists already", "--force"),
+    ("train parts -o new.json", "'a' and 'half'", "remove one", "--split object"),
     ("train data -o new.json --classifier magic", "'magic'", "logreg", "svm"),
     ("train data -o new.json --hold=-1", "hold", "-1"),
     ("train data -o new.json --init builtin:twin --window 14", "--init", "leave out --window"),
@@ -146,6 +148,12 @@ MESSAGES = [
     ("calibrate builtin:any hand -o new.json", "the source hand was removed"),
     ("calibrate builtin:any data -o new.json --seconds 9", "--seconds", "live sources", "data"),
     ("calibrate builtin:any xela://auto -o new.json --seconds 0", "--seconds", "0 s expected"),
+    (
+        "calibrate builtin:any slips -o new.json",
+        "as slip",
+        "at most 1 %",
+        "thumb 5.30 to 6.50 s of a",
+    ),
     ("calibrate builtin:any data -o kept.json", "kept.json exists already", "--force"),
     ("demo new --speed=-1", "--speed", "-1"),
     ("demo new --seed=-1", "--seed", "-1"),
@@ -194,6 +202,10 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("messages")
     whole = synthetic_recording("a", 1, ("thumb", "index"))
     thumb = whole.modules["thumb"]
+    slips = {
+        name: [replace(x, cause=x.cause and Cause.SLIP) for x in module.labels[2:5]]
+        for name, module in whole.modules.items()
+    }
     half = replace(thumb, times=thumb.times[::2], readings=thumb.readings[::2], labels=())
     wide = Tactile(sensor("uskin-4x6"), np.arange(100) / 100, np.zeros((100, 24, 3)))
     touched = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
@@ -203,6 +215,9 @@ def folder(tmp_path_factory):
         "a": whole.modules,
         "data/a": whole.modules,
         "data/b": synthetic_recording("b", 2, ("thumb", "index")).modules,
+        "parts/a": whole.modules,
+        "parts/half": {"index": thumb.slice(300, 1400)},
+        "slips/a": whole.with_labels(slips).modules,
         "bare/a": whole.with_labels({}).modules,
         "slow": {"thumb": half},
         "wide": {"thumb": wide},

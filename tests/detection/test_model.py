@@ -59,6 +59,31 @@ def saved(hand_model, path):
     return path
 
 
+class TestTraining:
+    @pytest.mark.parametrize("n", [1, 10, 1000])
+    def test_blocks_make_a_file_a_fifth_larger_at_most(self, n, tmp_path):
+        recordings = {f"grasp-{k}": f"{k:032x}" for k in range(n)}
+        training = msgspec.structs.replace(TRAINING, recordings=recordings)
+        own = np.random.default_rng(0).integers(2**64, size=(n, 1000), dtype=np.uint64)
+        with_blocks = FULL.with_training(training, list(own))
+        bare = msgspec.structs.replace(FULL, training=training)
+        sizes = [saved(x, tmp_path / f"{x is bare}").stat().st_size for x in (with_blocks, bare)]
+        assert sizes[0] <= 1.2 * sizes[1]
+        assert all(with_blocks.training.has_any(blocks) for blocks in own)
+        assert not bare.training.has_any(own[0])
+
+    def test_without_blocks_a_file_is_as_before(self):
+        assert b"blocks" not in encode(FULL)
+
+    @pytest.mark.parametrize("blocks", ["AAAA", "AAAAAAA", "A", 5])
+    def test_blocks_are_whole(self, blocks, tmp_path):
+        fields = json.loads(encode(FULL))
+        fields["training"]["blocks"] = blocks
+        (tmp_path / "m.json").write_text(json.dumps(fields))
+        with pytest.raises(ModelError, match=r"m\.json"):
+            Model.load(tmp_path / "m.json")
+
+
 class TestSaveAndLoad:
     @pytest.mark.parametrize(
         "hand_model", [FULL, Model.load("builtin:noise-floor"), model(), WITH_SQUARES]

@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.blocks import MAX_PACKED, PACKED_BYTES, Digests, any_packed, pack
 from holdfast.contact import MAX_TAXELS
 from holdfast.detection.features import extract
 from holdfast.detection.heads import (
@@ -26,7 +27,7 @@ from holdfast.detection.heads import (
     check_limit,
 )
 from holdfast.detection.kernel_config import ModelConfig, model_config
-from holdfast.detection.model_files import decode, encode, read_model, write_model
+from holdfast.detection.model_files import decode, encode, file_text, read_model, write_model
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import DEFAULT_WINDOW, FeatureSpec
 from holdfast.errors import ModelError
@@ -49,6 +50,10 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         samples: number of used and of all labelled samples of each finger of which only every
             n-th was used.
         sliding_samples: number of sliding samples that each slip rule was trained on.
+        blocks: shortened digests of blocks of the recordings, by which parts of them are found.
+
+    Raises:
+        ModelError: the blocks are not whole.
     """
 
     recordings: dict[str, str]
@@ -59,6 +64,18 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str] = {}
     samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
     sliding_samples: dict[str, int] | msgspec.UnsetType = msgspec.UNSET
+    # Unset in models that were trained before there were blocks.
+    blocks: bytes | msgspec.UnsetType = msgspec.UNSET
+
+    def __post_init__(self) -> None:
+        if self.blocks is not msgspec.UNSET and len(self.blocks) % PACKED_BYTES:
+            raise ModelError(
+                f"blocks of {PACKED_BYTES} bytes each expected, {len(self.blocks)} bytes given"
+            )
+
+    def has_any(self, blocks: Digests) -> bool:
+        """Return whether one of some blocks is of a training recording, as far as is known."""
+        return self.blocks is not msgspec.UNSET and any_packed(self.blocks, blocks)
 
 
 ANY_FINGER = "*"
@@ -67,6 +84,9 @@ EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
 RELATIVE_RATES = (30.0, 1000.0)
 """Rates for which relative features are made [Hz]."""
+MAX_PACKED_SHARE = 0.147
+"""Most bytes of packed blocks, as a share of the file of the model. In Base64 they are a third
+longer: 19.6 %."""
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -177,6 +197,21 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
             "teach): slip_probability is a ranking, and UNSTABLE the sign to grip harder in advance"
         )
+
+    def with_training(self, training: Training, blocks: Sequence[Digests]) -> Self:
+        """Return the model with its provenance, and as many blocks as make it 20 % larger at most.
+
+        Args:
+            training: provenance; its blocks, of a model that was adapted, are kept.
+            blocks: of each training recording.
+        """
+        replace = msgspec.structs.replace
+        before = b"" if training.blocks is msgspec.UNSET else training.blocks
+        model = replace(self, training=replace(training, blocks=msgspec.UNSET))
+        n_bytes = MAX_PACKED_SHARE * len(file_text(model.encoded())) - len(before)
+        n_each = int(min(max(n_bytes / PACKED_BYTES / len(blocks), 1), MAX_PACKED))
+        packed = before + pack(blocks, n_each)
+        return replace(model, training=replace(training, blocks=packed or msgspec.UNSET))
 
     def changed(self, change: Callable[[FingerModel], FingerModel]) -> Self:
         """Return the model with each of its fingers changed by a function."""

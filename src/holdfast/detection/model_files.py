@@ -59,7 +59,12 @@ def write_model(path: str | Path, data: bytes, *, force: bool) -> None:
     """
     if str(path).startswith("builtin:"):
         raise OutputError(f"{path} is the name of a built-in model; a file expected")
-    write_whole(path, msgspec.json.format(data, indent=1) + b"\n", force=force)
+    write_whole(path, file_text(data), force=force)
+
+
+def file_text(data: bytes) -> bytes:
+    """Return the text of a model file."""
+    return msgspec.json.format(data, indent=1) + b"\n"
 
 
 def encode(model: msgspec.Struct, sensors: Mapping[str, Sensor]) -> bytes:

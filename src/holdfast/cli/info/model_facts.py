@@ -36,6 +36,7 @@ def facts_of(model: Model) -> dict[str, Any]:
     if model.training is not None:
         training = msgspec.to_builtins(model.training)
         training["recordings"] = list(model.training.recordings)
+        training.pop("blocks", None)
     return {
         "name": model.name,
         "rate": model.rate,
