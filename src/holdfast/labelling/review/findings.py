@@ -91,8 +91,8 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         for each in scan.alike
     ]
     if reason := evidence_of_contact(scan.recording):
-        text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
-        text += "z of the sensor points inwards (docs/sensors.md)"
+        text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
+        text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
     with suppress(HoldfastError):  # no sample for the tare
         if not hand_force(scan.recording).n_touching.any():
