@@ -76,7 +76,9 @@ MESSAGES = [
     (f"play {NO_SERVER} --speed 2", "--speed", NO_SERVER),
     ("play finger.parquet --whole-hand", "--whole-hand", "finger1", "allegro-uskin", "thumb"),
     ("import none out", "none does not exist"),
-    ("import nothing out", "nothing", "--format", "--sensor"),
+    ("import nothing out", "nothing is empty"),
+    ("import nothing out --sensor anyskin", "nothing is empty"),
+    ("import other out", "other", "--format", "--sensor"),
     ("import kept out --format bag", "'bag'", "csv"),
     ("import a.parquet out --suffix bag", "'bag'", "'mcap'"),
     ("import a.parquet kept", "kept", "a folder expected"),
@@ -86,7 +88,8 @@ MESSAGES = [
     ("import a.parquet out --jobs 0", "jobs", "0 given"),
     ("import a.parquet out --engine spark:x", "'spark:x'", "loky", "dask"),
     ("info none", "none does not exist"),
-    ("info nothing", "nothing", "holdfast import"),
+    ("info nothing", "nothing is empty", "holdfast import"),
+    ("info other", "no recording in other (1 other", "holdfast import"),
     ("info data --plot x.svg", "--plot", "data"),
     ("info builtin:any --plot x.svg", "--plot", "builtin:any"),
     ("info a.parquet --plot x.txt", "x.txt", ".png"),
@@ -216,9 +219,10 @@ def folder(tmp_path_factory):
     (folder / "damaged.parquet").write_bytes(data)
     RecordingWriter(folder / "empty.mcap", {"thumb": sensor("uskin-curved")}).close()
     (folder / "nothing").mkdir()
+    (folder / "other").mkdir()
     for name in ("json", "svg", "pdf", "mcap"):
         (folder / f"kept.{name}").write_text("mine")
-    for name in ("kept", "data/a.csv"):
+    for name in ("kept", "data/a.csv", "other/a.txt"):
         (folder / name).write_text("mine")
     taxels = ",".join(f"F{axis}{taxel}" for taxel in range(9) for axis in "xyz")
     press = "".join(f"{10 * k},{','.join(map(str, range(k, k + 27)))}\n" for k in range(30))

@@ -177,7 +177,10 @@ def _format_of(
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
-        for file in [path] if path.is_file() else sorted(path.iterdir()):
+        files = [path] if path.is_file() else sorted(path.iterdir())
+        if not files:
+            raise RecordingError(f"{path} is empty; a file or folder to import expected")
+        for file in files:
             if is_lfs_pointer(file):  # the clone was made without the data
                 raise RecordingError(refusal_of_lfs_pointer(file))
         if name is not None or not (sensors or columns):
