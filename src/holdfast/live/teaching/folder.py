@@ -21,7 +21,7 @@ class TeachingFolder:
     """Folder of a protocol. Each result is written at once, so that a break loses nothing.
 
     Args:
-        path: of the folder; it is created.
+        path: of the folder; the first `save` creates it.
         resume: go on with the protocol of the folder.
 
     Attributes:
@@ -49,7 +49,6 @@ class TeachingFolder:
             raise OutputError(f"{path} has no {JOURNAL} and is not empty: another folder expected")
         elif resume:
             raise RecordingError(f"{path} has no {JOURNAL}: there is nothing to resume")
-        self._write()
 
     @property
     def kept(self) -> list[GraspResult]:
@@ -68,7 +67,11 @@ class TeachingFolder:
         for result in self.results:
             if result.recording and not result.kept:
                 self.leave_out(self.path / f"{result.recording}.mcap")
-        self._write()
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as cause:
+            raise OutputError(f"cannot write to {self.path}: {cause.strerror}") from cause
+        write_whole(self._journal, msgspec.json.encode(self.results), force=True)
 
     def leave_out(self, path: Path) -> None:
         """Move a recording, its labels and its video aside."""
@@ -87,10 +90,3 @@ class TeachingFolder:
             raise RecordingError(
                 f"{self._journal} has no results of a protocol: {cause}"
             ) from cause
-
-    def _write(self) -> None:
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise OutputError(f"cannot write to {self.path}: {cause.strerror}") from cause
-        write_whole(self._journal, msgspec.json.encode(self.results), force=True)
