@@ -6,7 +6,8 @@ import pytest
 from holdfast.errors import RecordingError
 from holdfast.io import foreign, stickers
 from holdfast.io.foreign import read_stickers
-from holdfast.io.stickers import sticker_poses
+from holdfast.io.stickers import picture_stamps, sticker_poses
+from traps import traps
 
 cv2 = pytest.importorskip("cv2")
 
@@ -96,3 +97,11 @@ def test_a_damaged_film_ends(film, tmp_path):
 def test_a_missing_film(tmp_path):
     with pytest.raises(RecordingError, match=r"run\.mp4 does not exist"):
         read_stickers(tmp_path / "run.mp4")
+
+
+@traps
+def test_no_stamps_are_read_but_of_a_file(tmp_path, word, trap):
+    assert picture_stamps(tmp_path / "run.mp4") is None
+    trap(tmp_path / "run.times")
+    with pytest.raises(RecordingError, match=rf"run\.times: it is a {word}"):
+        picture_stamps(tmp_path / "run.mp4")

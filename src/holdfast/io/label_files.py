@@ -111,9 +111,33 @@ def load_labels(path: str | Path) -> LabelFile:
         RecordingError: it cannot be read, is not a label file, or does not match its digest.
     """
     try:
-        file = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE), type=LabelFile)
+        return decode_labels(read_input(path, MAX_LABEL_FILE_SIZE), path)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+
+
+def label_bytes(path: Path) -> bytes | None:
+    """Return the content of the label file of the recording at `path`; None without one.
+
+    Raises:
+        RecordingError: it cannot be read, or is a link.
+    """
+    try:
+        return read_input(labels_path(path), MAX_LABEL_FILE_SIZE, follow=False)
+    except FileNotFoundError:
+        return None
+    except OSError as cause:
+        raise RecordingError(f"cannot read {labels_path(path)}: {cause.strerror}") from cause
+
+
+def decode_labels(data: bytes, path: str | Path) -> LabelFile:
+    """Decode the content of the label file at `path`.
+
+    Raises:
+        RecordingError: it is not a label file, or does not match its digest.
+    """
+    try:
+        file = msgspec.json.decode(data, type=LabelFile)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as cause:
         raise RecordingError(f"{path} is not a label file: {cause}") from cause
     if file.digest not in ("", _digest(file)):
@@ -140,10 +164,22 @@ def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | Non
     Raises:
         RecordingError: the file is not a label file, or belongs to another recording.
     """
+    data = label_bytes(path)
+    return None if data is None else labels_of(decode_labels(data, labels_path(path)), path, digest)
+
+
+def labels_of(file: LabelFile, path: Path, digest: str) -> Mapping[str, tuple[Label, ...]]:
+    """Return the labels of a label file by module.
+
+    Args:
+        file: content of the file.
+        path: path of the recording.
+        digest: digest of the recording.
+
+    Raises:
+        RecordingError: the file belongs to another recording, or a label is not valid.
+    """
     file_path = labels_path(path)
-    if not file_path.exists():
-        return None
-    file = load_labels(file_path)
     if file.recording != digest:
         raise RecordingError(
             f"{file_path} labels another recording ({file.name!r}, hash {file.recording[:12]}) "

@@ -6,13 +6,13 @@ the position is exact to a few hundredths of a pixel, where single corners are f
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
+from holdfast.files import read_input
 
 Picture = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
@@ -49,13 +49,17 @@ def picture_stamps(video: Path) -> Array | None:
         RecordingError: the file has something else, or times that do not increase.
     """
     path = stamps_path(video)
-    if not path.exists():
-        return None
     stamps = np.zeros(2)
-    with suppress(OSError, ValueError):
-        if path.stat().st_size <= MAX_STAMPS:
-            # A process that was killed may have written half of the last line.
-            stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
+    try:
+        text = read_input(path, MAX_STAMPS, follow=False)
+        # A process that was killed may have written half of the last line.
+        stamps = np.array([float(line) for line in text.split(b"\n")[:-1]])
+    except FileNotFoundError:
+        return None
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except ValueError:  # it is refused below
+        pass
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0).any():
         raise RecordingError(f"{path}: a time in each line [s], each later than the last, expected")
     return stamps

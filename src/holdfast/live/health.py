@@ -14,7 +14,7 @@ import numpy as np
 
 from holdfast.devices.sources import Source, open_source
 from holdfast.errors import SourceError
-from holdfast.files import write_whole
+from holdfast.files import read_input, write_whole
 from holdfast.recordings import GAP_PERIODS
 from holdfast.sensors import Sensor, taxel_number
 from holdfast.sensors.types import Array
@@ -33,6 +33,8 @@ ROUNDING_NOISE = {"count": 0.3, "N": 1e-6}
 """Noise below which a taxel is not compared: that of rounding [unit of the readings]."""
 MAX_KEPT = 50
 """Number of checks of a source that are kept."""
+MAX_HISTORY = 1 << 25
+"""Largest file of checks [bytes]; 50 checks of 368 taxels take 1.2 MB."""
 MIN_CHECKED_SAMPLES = 20
 """Samples of a module from which on its health is known."""
 ARRIVAL_TIMEOUT, EXTRA_SECONDS = 0.2, 5.0
@@ -267,11 +269,12 @@ def read_history(path: Path) -> list[HealthCheck]:
         SourceError: the file is none of checks.
     """
     try:
-        return msgspec.json.decode(path.read_bytes(), type=list[HealthCheck])
+        return msgspec.json.decode(read_input(path, MAX_HISTORY), type=list[HealthCheck])
     except FileNotFoundError:
         return []
     except (OSError, ValueError) as cause:
-        raise SourceError(f"{path} is no history of checks: {cause}; delete it") from cause
+        why = cause.strerror if isinstance(cause, OSError) else cause
+        raise SourceError(f"{path} is no history of checks: {why}; delete it") from cause
 
 
 def keep(path: Path, history: Sequence[HealthCheck], check: HealthCheck) -> None:

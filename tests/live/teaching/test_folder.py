@@ -5,6 +5,7 @@ import pytest
 from holdfast.errors import OutputError, RecordingError
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import GraspResult
+from traps import traps
 
 HOLD = GraspResult("hold", 1, 9.5, True, "001-hold", "held for 9 s")
 REPEATED = GraspResult("pull", 1, 9.5, False, "002-pull", "no slide seen")
@@ -47,6 +48,13 @@ def test_what_is_not_its_own_is_refused(tmp_path):
 def test_results_that_cannot_be_read_are_an_error(tmp_path, content):
     (tmp_path / "teach.json").write_text(content)
     with pytest.raises(RecordingError, match=r"teach\.json has no results of a protocol: "):
+        TeachingFolder(tmp_path, resume=True)
+
+
+@traps
+def test_no_journal_is_read_but_a_file(tmp_path, word, trap):
+    trap(tmp_path / "teach.json")
+    with pytest.raises((OutputError, RecordingError), match=rf"it is a {word}|has no teach\.json"):
         TeachingFolder(tmp_path, resume=True)
 
 

@@ -6,13 +6,15 @@ from pathlib import Path
 import msgspec
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.files import write_whole
+from holdfast.files import read_input, write_whole
 from holdfast.io.label_files import labels_path
 from holdfast.io.stickers import stamps_path
 from holdfast.live.teaching.protocol import GraspResult
 
 JOURNAL = "teach.json"
 """Name of the file with the results of all grasps."""
+MAX_JOURNAL = 1 << 20
+"""Largest file of results [bytes]; 999 grasps take 200 kB."""
 ASIDE = "left-out"
 """Name of the folder inside, of grasps that were repeated or skipped: they teach nothing."""
 
@@ -85,8 +87,9 @@ class TeachingFolder:
 
     def _read(self) -> list[GraspResult]:
         try:
-            return msgspec.json.decode(self._journal.read_bytes(), type=list[GraspResult])
+            return msgspec.json.decode(
+                read_input(self._journal, MAX_JOURNAL, follow=False), type=list[GraspResult]
+            )
         except (OSError, ValueError) as cause:
-            raise RecordingError(
-                f"{self._journal} has no results of a protocol: {cause}"
-            ) from cause
+            why = cause.strerror if isinstance(cause, OSError) else cause
+            raise RecordingError(f"{self._journal} has no results of a protocol: {why}") from cause
