@@ -1,7 +1,9 @@
 import json
 import time
+import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -296,3 +298,20 @@ def test_labels_outside_the_recording_are_not_cut_but_refused(given):
     assert found == {"index": (label,)}
     with pytest.raises(ValueError, match=r"^index: label .* lies outside the recording"):
         validated(uneven(), found)
+
+
+def test_memory_of_many_labels(bare):
+    """A label that is saved takes less than 900 bytes, in all its forms together."""
+    recording, path = bare
+    edges = np.linspace(recording.start, recording.end, 20_001).tolist()
+    inputs = {"thumb": [LabelInput(*span, "stable") for span in pairwise(edges)]}
+    revision = "none"
+    for _ in range(2):
+        tracemalloc.start()
+        labels = cut_to_samples(recording, parse_labels(inputs))
+        revision = save_stored(
+            path, recording, labels, revision=revision, author="ada", time=NOW
+        ).revision
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 900 * 20_000

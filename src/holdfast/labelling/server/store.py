@@ -21,13 +21,16 @@ from holdfast.files import lock, sync, write_whole
 from holdfast.io.header import label_data
 from holdfast.io.label_files import (
     LabelFile,
+    LabelOwner,
+    check_owner,
+    decode_file,
     decode_labels,
     encode_labels,
     label_bytes,
     labels_of,
     labels_path,
 )
-from holdfast.recordings import Label, Recording
+from holdfast.recordings import Label, Recording, cut_labels
 
 NO_REVISION = "none"
 """Revision of a label file that does not exist."""
@@ -166,15 +169,17 @@ def save_stored(
         name: tuple(label if label.author else replace(label, author=author) for label in valid)
         for name, valid in validated(recording, labels).items()
     }
-    file = LabelFile(
-        recording=recording.digest,
-        name=recording.name,
-        modules={name: [label_data(label) for label in done] for name, done in signed.items()},
-        author=author,
-        time=time,
-        notes=note,
+    # Of half a million labels, no form is kept longer than until the next one is made.
+    data = encode_labels(
+        LabelFile(
+            recording=recording.digest,
+            name=recording.name,
+            modules={name: [label_data(label) for label in done] for name, done in signed.items()},
+            author=author,
+            time=time,
+            notes=note,
+        )
     )
-    data = encode_labels(file)
     target = labels_path(path)
     if is_read_only(path):
         raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
@@ -187,7 +192,7 @@ def save_stored(
                 f"{target.name} was changed by another program since it was read", current
             )
         if before is not None:  # raises if the file is not this recording's
-            labels_of(decode_labels(before, target), path, recording.digest)
+            check_owner(decode_file(before, target, LabelOwner), path, recording.digest)
         write_whole(target, data, force=True)
         sync(target, target.parent)
         return StoredLabels(signed, "file", revision_of(data), author, time, note)
@@ -268,17 +273,13 @@ def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tupl
     end = recording.end + max(module.period for module in recording.modules.values())
     cut: dict[str, tuple[Label, ...]] = {}
     for finger, uncut in labels.items():
-        module, kept = recording.modules.get(finger), []
+        inside, outside = [], []
         for label in uncut:
-            if module is None or not module.n_samples:
-                kept.append(label)
-            elif start <= label.start and label.end <= end + TIME_TOLERANCE:
-                begins = max(label.start, float(module.times[0]))
-                ends = min(label.end, float(module.times[-1]) + module.period)
-                kept += [replace(label, start=begins, end=ends)] if begins < ends else []
-            else:
-                kept.append(label)
-        cut[finger] = tuple(kept)
+            is_inside = start <= label.start and label.end <= end + TIME_TOLERANCE
+            (inside if is_inside else outside).append(label)
+        module = recording.modules.get(finger)
+        has_samples = module is not None and module.n_samples
+        cut[finger] = (*(cut_labels(inside, module) if has_samples else inside), *outside)
     return cut
 
 
