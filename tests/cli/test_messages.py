@@ -186,7 +186,7 @@ MESSAGES = [
     ("sensors gtac --template 3x3", "--template", "'gtac'"),
     ("doctor --history x.json", "--history", "SOURCE"),
     ("doctor serial:///dev/null?sensor=part.json", "part.json", "'positions'"),
-    ("doctor touched.parquet --history x.json", "index was touched at 2.1 s"),
+    ("doctor touched.parquet --history x.json", "index is touched from the start"),
 ]
 """Words of a command, and what its message must name: what was wrong, or what to type instead."""
 
@@ -200,7 +200,7 @@ def folder(tmp_path_factory):
     half = replace(thumb, times=thumb.times[::2], readings=thumb.readings[::2], labels=())
     wide = Tactile(sensor("uskin-4x6"), np.arange(100) / 100, np.zeros((100, 24, 3)))
     touched = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
-    touched[200:, 5, 2] += 500  # one step, louder than any noise
+    touched[:200, 5, 2] += 500  # one step, louder than any noise
     touched = Tactile(sensor("uskin-4x4"), np.arange(300) / 100, touched)
     for name, modules in {
         "a": whole.modules,
