@@ -105,6 +105,8 @@ MESSAGES = [
     ("label auto signal gone", "gone does not exist"),
     ("label auto signal data --tare soon", "tare", "soon"),
     ("label auto signal data --set share", "--set NAME=VALUE", "'share'"),
+    ("label auto signal data --dry-run --set window=1e18", "window", "1e+09", "1e+18"),
+    ("label auto signal data --dry-run --set window=9e8", "window", "the recording", "9e+08"),
     ("label auto signal data --poses p.csv", "--poses", "tracking", "'signal'"),
     ("label auto signal data --video a.mp4", "--video", "tracking", "'signal'"),
     ("label auto tracking data --poses gone.csv", "gone.csv"),
