@@ -1,6 +1,7 @@
 """Recordings: continuous captures of a hand. Values only, no files and no clock."""
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -29,7 +30,7 @@ MAX_SHOWN_CLOCK = 1e5
 """If a recording starts later than this, times are shown since its start [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Label:
     """Contact state over the interval [start, end), with its evidence.
 
@@ -59,7 +60,7 @@ class Label:
     author: str = ""
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.start, self.end]).all() and self.start < self.end):
+        if not -math.inf < self.start < self.end < math.inf:
             raise ValueError(f"a label ends after its start; [{self.start}, {self.end}) s given")
         object.__setattr__(self, "state", ContactState(self.state))
         object.__setattr__(self, "cause", None if self.cause is None else Cause(self.cause))
@@ -211,13 +212,15 @@ class Tactile:
         return replace(part, labels=cut_labels(self.labels, part))
 
 
-def cut_labels(labels: tuple[Label, ...], module: Tactile) -> tuple[Label, ...]:
+def cut_labels(labels: Sequence[Label], module: Tactile) -> tuple[Label, ...]:
     """Return the labels that overlap the samples of a module, cut to them."""
     if module.n_samples == 0:
         return ()
     first, last = float(module.times[0]), float(module.times[-1]) + module.period
     return tuple(
-        replace(label, start=max(label.start, first), end=min(label.end, last))
+        label
+        if first <= label.start and label.end <= last
+        else replace(label, start=max(label.start, first), end=min(label.end, last))
         for label in labels
         if label.start < last and label.end > first
     )

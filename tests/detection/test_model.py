@@ -73,11 +73,11 @@ class TestTraining:
         assert not bare.training.has_any(own[0])
 
     def test_without_blocks_a_file_is_as_before(self):
-        assert b"blocks" not in encode(FULL)
+        assert b"blocks" not in FULL.encoded()
 
     @pytest.mark.parametrize("blocks", ["AAAA", "AAAAAAA", "A", 5])
     def test_blocks_are_whole(self, blocks, tmp_path):
-        fields = json.loads(encode(FULL))
+        fields = json.loads(FULL.encoded())
         fields["training"]["blocks"] = blocks
         (tmp_path / "m.json").write_text(json.dumps(fields))
         with pytest.raises(ModelError, match=r"m\.json"):
