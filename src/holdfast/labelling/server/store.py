@@ -273,13 +273,12 @@ def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tupl
     end = recording.end + max(module.period for module in recording.modules.values())
     cut: dict[str, tuple[Label, ...]] = {}
     for finger, uncut in labels.items():
-        inside, outside = [], []
-        for label in uncut:
-            is_inside = start <= label.start and label.end <= end + TIME_TOLERANCE
-            (inside if is_inside else outside).append(label)
         module = recording.modules.get(finger)
-        has_samples = module is not None and module.n_samples
-        cut[finger] = (*(cut_labels(inside, module) if has_samples else inside), *outside)
+        is_inside = all(start <= x.start and x.end <= end + TIME_TOLERANCE for x in uncut)
+        if module is not None and module.n_samples and is_inside:
+            cut[finger] = cut_labels(uncut, module)
+        else:  # `validated` rejects them
+            cut[finger] = tuple(uncut)
     return cut
 
 
