@@ -89,6 +89,9 @@ typedef struct {
     hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
+    bool is_alive;         /* a reading has changed, or the finger rests at zero as it may */
+    int64_t n_constant;    /* samples before that */
+    hf_real constant_sum;  /* weighted sum of their readings, see hf_scan */
     int64_t n_unchanged;   /* samples since the readings last changed */
     int64_t n_changes;     /* samples that changed the readings */
     int64_t longest_rest;  /* most samples without a change, if long and not by a fault */

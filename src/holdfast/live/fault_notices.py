@@ -46,7 +46,9 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         "if it stays, z of the sensor points inwards (docs/sensors.md)",
     ),
     Fault.DEAD: FaultText(
-        "dead", "taxels have not changed since the start: leave them out by --ignore FINGER:TAXEL"
+        "dead",
+        "readings have not changed since the start: check the cable of a finger that is dead as a "
+        "whole, and leave single taxels out by --ignore FINGER:TAXEL",
     ),
     Fault.NOISY: FaultText(
         "noisy", "taxels are far noisier than others: leave them out by --ignore FINGER:TAXEL"
