@@ -75,8 +75,8 @@ class Reason(_Coded):
 class Fault(_Coded):
     """Fault of a finger. Bit i of a fault mask is position i in this list: `Fault(i)`.
 
-    The detector finds the faults up to TARE_DRIFT, and those from OFFSET on, in the readings. A
-    source reports the others, which concern the arrival of samples.
+    The detector finds the faults up to TARE_DRIFT, and those from OFFSET to INVALID, in the
+    readings. A source reports the others, which concern the arrival of samples.
     """
 
     NOT_FINITE = "not_finite"
@@ -96,6 +96,7 @@ class Fault(_Coded):
     REPEATED = "repeated"
     FIELD = "field"
     INVALID = "invalid"
+    SLOW = "slow"
 
 
 class Cause(_Coded):

@@ -88,6 +88,11 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
     ),
+    Fault.SLOW: FaultText(
+        "slow",
+        "readings change less than 30 times a second, and are repeated between: raise the rate of "
+        "the sensor, not that of its server",
+    ),
 }
 """Texts of every fault, for pages and terminals."""
 
