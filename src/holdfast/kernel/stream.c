@@ -383,7 +383,7 @@ HF_API void holdfast_advance(
         if (present[i]) {
             hf_copy_to_lanes(&f, readings, f.readings);
             f.values->reason = hf_process(&f, time);
-            if (hf_is_dead(&f)) {
+            if (!f.state->is_alive && hf_is_dead(&f)) {
                 f.values->reason = HOLDFAST_FAULT;
                 f.values->faults = HOLDFAST_DEAD;
                 hf_clear(&f.values->taxels);
