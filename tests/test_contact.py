@@ -57,7 +57,15 @@ def test_a_code_becomes_its_word(kind, first):
 
 @pytest.mark.parametrize(
     ("fingers", "n_model_fingers", "expected"),
-    [
+    [  # x: dead
+        ("Sx", 2, STABLE),
+        ("-xx", 4, NO_CONTACT),
+        ("S-x", 4, NO_CONTACT),
+        ("SSx", 4, STABLE),
+        ("?x", 4, UNKNOWN),
+        ("Ux", 4, UNSTABLE),
+        ("xx", 4, UNKNOWN),
+        ("x", 1, UNKNOWN),
         ("S", 1, STABLE),
         ("-", 1, NO_CONTACT),
         ("U", 1, UNSTABLE),
@@ -77,8 +85,8 @@ def test_a_code_becomes_its_word(kind, first):
     ],
 )
 def test_state_of_a_hand(fingers, n_model_fingers, expected):
-    codes = np.array([NAMES[name] for name in fingers], dtype=np.int8)
-    assert hand_state(codes, n_model_fingers) == expected
+    codes = np.array([NAMES[name] for name in fingers if name != "x"], dtype=np.int8)
+    assert hand_state(codes, n_model_fingers, fingers.count("x")) == expected
 
 
 @given(st.lists(st.sampled_from(list(NAMES.values())), max_size=5), st.integers(1, 4))

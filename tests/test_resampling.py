@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from holdfast.contact import ContactState
 from holdfast.detection import Model, detect
 from holdfast.devices.sources.base import Arrival
-from holdfast.errors import StreamError
+from holdfast.errors import ModelError, StreamError
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import (
@@ -17,7 +17,7 @@ from holdfast.resampling import (
     rows_per_update,
     true_updates,
 )
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, sensor
 from holdfast.twin.simulation import Grasp, simulate
 from live import build
 
@@ -288,9 +288,51 @@ class TestSampleAndHold:
         assert at_rate(held, rate).rate == pytest.approx(expected, rel=0.01)
         assert (at_rate(slow, rate) is slow) is (expected == 50.0)
 
-    def test_a_sensor_that_updates_too_slowly_keeps_its_rows(self, grasp):
-        _, held = slow_and_held(grasp, slow_rate=10.0)
-        assert true_updates(held) is held
+    @pytest.mark.parametrize("jitter", [0, 2])
+    @pytest.mark.parametrize("slow_rate", [5.0, 10.0])
+    def test_a_slow_sensor_is_refused_as_without_its_copies(self, grasp, slow_rate, jitter):
+        """Also where the updates come at uneven rows, and beside a module that does not hold."""
+        slow, held = slow_and_held(grasp, rows=10, slow_rate=slow_rate)
+        rows = np.arange(held.modules["thumb"].n_samples)
+        early = np.random.default_rng(0).integers(0, jitter + 1, size=rows[-1] // 10 + 2)
+        at = np.minimum(rows // 10 + (rows % 10 >= 10 - early[rows // 10]), rows[-1] // 10)
+        modules = {
+            name: Tactile(m.sensor, held.modules[name].times, m.readings[at])
+            for name, m in slow.modules.items()
+        }
+        messages = []
+        for recording in (slow, Recording("held", modules)):
+            with pytest.raises(ModelError, match=f"{slow_rate:.0f}.* Hz given") as error:
+                detect(Model.load("builtin:any"), recording)
+            messages.append(str(error.value).split(" Hz")[0])
+        assert float(messages[1]) == pytest.approx(slow_rate, rel=0.12)
+        noise = np.random.default_rng(0).normal(size=modules["index"].readings.shape)
+        lively = Tactile(modules["index"].sensor, modules["index"].times, noise)
+        mixed = Recording("mixed", {"thumb": modules["thumb"], "index": lively})
+        updates = true_updates(mixed).modules
+        assert updates["index"] is lively
+        assert updates["thumb"].rate == pytest.approx(slow_rate, rel=0.12)
+
+    def test_zeros_between_true_readings_are_no_updates(self, grasp):
+        slow, held = slow_and_held(grasp, rows=3)
+        zeros = {}
+        for name, module in held.modules.items():
+            readings = np.array(module.readings)
+            readings[np.arange(len(readings)) % 3 != 0] = 0
+            zeros[name] = Tactile(module.sensor, module.times, readings)
+        updates = true_updates(Recording("zeros", zeros)).modules
+        for name, module in slow.modules.items():
+            assert np.array_equal(updates[name].times, module.times)
+            assert np.array_equal(updates[name].readings, module.readings)
+
+    @pytest.mark.parametrize("share", [0.05, 0.2])
+    def test_a_coarse_sensor_at_rest_is_not_slow(self, share):
+        """Less noise than a step: single taxels change, at random."""
+        changed = np.random.default_rng(0).random((2000, 16, 3)) < share / 48
+        readings = 500.0 + changed.cumsum(axis=0)
+        skin = sensor("uskin-4x4")
+        recording = Recording("rest", {"thumb": Tactile(skin, np.arange(2000) / 100, readings)})
+        assert true_updates(recording) is recording
 
     def test_a_module_that_does_not_hold_keeps_all_rows(self, grasp):
         _, held = slow_and_held(grasp)

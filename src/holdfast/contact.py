@@ -75,8 +75,8 @@ class Reason(_Coded):
 class Fault(_Coded):
     """Fault of a finger. Bit i of a fault mask is position i in this list: `Fault(i)`.
 
-    The detector finds the faults up to TARE_DRIFT, and those from OFFSET on, in the readings. A
-    source reports the others, which concern the arrival of samples.
+    The detector finds the faults up to TARE_DRIFT, and those from OFFSET to INVALID, in the
+    readings. A source reports the others, which concern the arrival of samples.
     """
 
     NOT_FINITE = "not_finite"
@@ -96,6 +96,7 @@ class Fault(_Coded):
     REPEATED = "repeated"
     FIELD = "field"
     INVALID = "invalid"
+    SLOW = "slow"
 
 
 class Cause(_Coded):
@@ -190,6 +191,11 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     slip_probability: float | None = None
     slip_speed: float | None = None
     slip_distance: float | None = None
+
+    @property
+    def is_dead(self) -> bool:
+        """Whether the readings of the finger never changed: it does not count for the hand."""
+        return Fault.DEAD in self.faults and not self.faulty_taxels
 
 
 class HandEstimate(msgspec.Struct, frozen=True, gc=False):
@@ -306,19 +312,22 @@ class StateChanges:
 
 
 MIN_HOLDING_FINGERS = 2
-"""Fingers in stable contact from which the hand is STABLE; one, for a model of one finger."""
+"""Fingers in stable contact from which the hand is STABLE; one, for a model of one finger, or where
+all others are dead."""
 
 
-def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int:
+def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int, n_dead: int = 0) -> int:
     """Return the state of a hand, from the codes of its fingers' states.
 
     The state is UNSTABLE if any finger is UNSTABLE, else UNKNOWN if any finger is UNKNOWN, else
-    STABLE if at least two fingers are in contact (one, for a model of one finger), else
-    NO_CONTACT.
+    STABLE if at least two fingers are in contact (one, for a model of one finger, or if only one
+    is not dead), else NO_CONTACT. Dead fingers do not count, and a hand of these is UNKNOWN. The
+    rule is that of `kernel/detector.c`.
 
     Args:
-        codes: (n_fingers,) codes of the states.
+        codes: (n_fingers,) codes of the states of the fingers that are not dead.
         n_model_fingers: number of fingers of the model.
+        n_dead: number of dead fingers.
 
     Returns:
         The code of the hand's state.
@@ -335,10 +344,10 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int) -> int
             return UNSTABLE
         n_unknown += code == UNKNOWN
         n_stable += code == STABLE
-    if n_unknown > 0:
+    if n_unknown > 0 or (n_dead and not len(codes)):
         return UNKNOWN
-    holds = n_stable >= min(MIN_HOLDING_FINGERS, n_model_fingers)
-    return STABLE if holds else NO_CONTACT
+    n_able = 1 if n_dead and len(codes) == 1 else n_model_fingers
+    return STABLE if n_stable >= min(MIN_HOLDING_FINGERS, n_able) else NO_CONTACT
 
 
 # By the rule itself, so that it stands once: 4 unstable + 2 unknown + held is the index.
@@ -376,15 +385,15 @@ def hand_states(
 
 
 def enough_contacts(
-    n_contacts: npt.NDArray[np.integer[Any]], n_model_fingers: int
+    n_contacts: npt.NDArray[np.integer[Any]], n_model_fingers: int | npt.NDArray[np.integer[Any]]
 ) -> npt.NDArray[np.bool_]:
     """Return where enough fingers are in contact to hold an object.
 
     Args:
         n_contacts: (n,) number of fingers in contact.
-        n_model_fingers: number of fingers of the model.
+        n_model_fingers: number of fingers of the model; (n,) 1 where only one is not dead.
     """
-    return np.asarray(n_contacts >= min(MIN_HOLDING_FINGERS, n_model_fingers))
+    return np.asarray(n_contacts >= np.minimum(MIN_HOLDING_FINGERS, n_model_fingers))
 
 
 @cache
@@ -457,5 +466,6 @@ def with_faults(
             cause=None,
             faults=tuple(fault for fault in Fault if fault in both),
         )
-    codes = np.array([finger.state.code for finger in fingers.values()], dtype=np.int64)
-    return HandEstimate(estimate.time, _STATES[hand_state(codes, n_model_fingers)], fingers)
+    states = [finger.state.code for finger in fingers.values() if not finger.is_dead]
+    codes, n_dead = np.array(states, dtype=np.int64), len(fingers) - len(states)
+    return HandEstimate(estimate.time, _STATES[hand_state(codes, n_model_fingers, n_dead)], fingers)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from holdfast.errors import StreamError
 from holdfast.recordings import GAP_PERIODS, Recording
+from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags, Integers
 
 TOLERANCE_PERIODS = 1e-3
@@ -23,8 +24,9 @@ MIN_ROWS_PER_UPDATE = 1.5
 EVEN_SHARE = 0.95
 """Minimum share of the changes of such a sensor that follow after even numbers of rows."""
 MIN_UPDATE_RATE = 30.0
-"""Least rate of the updates that are used in place of the rows [Hz]: that of `builtin:any`. A
-slower sensor keeps its rows."""
+"""Rate of the updates below which a sensor is slow [Hz]: the least of `builtin:any`."""
+MIN_COMPARED_TAXELS, CHANGED_SHARE = 4, 0.5
+"""Taxels from which a sensor shows that it updates all at once: at least this share of them."""
 MIN_HELD_UPDATES = 4
 """Minimum number of steps between changes that show how a sensor updates."""
 LATE_UPDATE = 1.6
@@ -59,6 +61,44 @@ def rows_per_update(changed: Sequence[bool] | Flags) -> float:
     return float(even.mean())
 
 
+def held_rows(readings: Array, sensor: Sensor, rate: float) -> float | None:
+    """Return how many rows a sensor holds each of its samples; 1 if it does not.
+
+    A slow one may update at uneven times: whenever a reading changes, most taxels do. Zeros of all
+    taxels are no update of a sensor that does not rest at zero: it was read too early.
+
+    Args:
+        readings: (n, n_taxels, 3).
+        sensor: of the readings.
+        rate: of the rows [Hz].
+
+    Returns:
+        None if no reading changes.
+    """
+    rows = np.arange(len(readings))
+    if skips_zeros(sensor):
+        rows = np.maximum.accumulate(np.where(readings.any(axis=(1, 2)), rows, 0))
+    newer, older = readings[rows[1:]], readings[rows[:-1]]
+    differ = ((newer != older) & ~(np.isnan(newer) & np.isnan(older))).any(axis=2)
+    changed = differ.any(axis=1)
+    if not changed.any():
+        return None
+    # The first row is an update whatever it is.
+    n_rows = rows_per_update(np.append(True, changed))
+    steps = np.diff(np.flatnonzero(changed))
+    if n_rows > 1.0 or len(steps) < MIN_HELD_UPDATES or sensor.n_taxels < MIN_COMPARED_TAXELS:
+        return n_rows
+    typical = float(np.median(steps))
+    at_once = (differ[changed].mean(axis=1) >= CHANGED_SHARE).mean() >= EVEN_SHARE
+    is_slow = typical >= MIN_ROWS_PER_UPDATE and rate / typical < MIN_UPDATE_RATE
+    return typical if is_slow and at_once else 1.0
+
+
+def skips_zeros(sensor: Sensor) -> bool:
+    """Return whether zeros of all taxels are no reading of a sensor."""
+    return not sensor.rests_at_zero
+
+
 class UpdateFilter:
     """Filter that drops the repeated samples of a sample-and-hold sensor, row by row.
 
@@ -67,6 +107,7 @@ class UpdateFilter:
 
     Args:
         rate: of the updates [Hz].
+        skips_zeros: zeros of all taxels are no update.
 
     Example:
         >>> repeats = UpdateFilter(rate=10.0)
@@ -74,15 +115,16 @@ class UpdateFilter:
         [True, False, False, False, True, False]
     """
 
-    def __init__(self, rate: float) -> None:
-        self._longest = LATE_UPDATE / rate
+    def __init__(self, rate: float, *, skips_zeros: bool = False) -> None:
+        self._longest, self._skips_zeros = LATE_UPDATE / rate, skips_zeros
         self._time = -np.inf
         self._reading: npt.NDArray[Any] = np.empty(0)
 
     def is_update(self, time: float, reading: npt.ArrayLike) -> bool:
         """Return whether a row is a sample: it has changed, or it is late [s]."""
-        if time - self._time < self._longest and np.array_equal(
-            self._reading, reading, equal_nan=True
+        if time - self._time < self._longest and (
+            np.array_equal(self._reading, reading, equal_nan=True)
+            or (self._skips_zeros and not np.any(reading))
         ):
             return False
         self._time, self._reading = time, np.array(reading)
@@ -93,30 +135,32 @@ def true_updates(recording: Recording) -> Recording:
     """Return the recording with the true updates of its sensors, if all of them hold samples.
 
     A sensor that updates at 50 Hz in rows of 200 Hz repeats each reading four times. The rows
-    between are no samples: features of them would be those of a slower motion with pauses.
+    between are no samples: features of them would be those of a slower motion with pauses. A slow
+    sensor, under 30 Hz, gets its true updates also beside sensors that do not hold their samples.
 
     Returns:
-        The same object if a sensor does not hold its samples, or updates too slowly.
+        The same object if a sensor does not hold its samples, and none is slow.
     """
     modules = {name: module for name, module in recording.modules.items() if module.n_samples}
-    held: dict[str, float] = {}
-    for name, module in modules.items():
-        readings = module.readings[:HELD_ROWS]
-        newer, older = readings[1:], readings[:-1]
-        differ = (newer != older) & ~(np.isnan(newer) & np.isnan(older))
-        # The first row is an update whatever it is.
-        held[name] = rows_per_update(np.append(True, differ.any(axis=(1, 2))))
-    if not held or min(held.values()) == 1.0:
-        return recording
-    if min(module.rate / held[name] for name, module in modules.items()) < MIN_UPDATE_RATE:
-        return recording
+    held = {
+        name: held_rows(module.readings[:HELD_ROWS], module.sensor, module.rate)
+        for name, module in modules.items()
+    }
+    known = [n_rows for n_rows in held.values() if n_rows is not None]
+    every = min(known, default=1.0) > 1.0
     updates = {}
     for name, module in modules.items():
-        repeats = UpdateFilter(1 / (held[name] * module.period))
+        n_rows = held[name] or (min(known) if every else 1.0)
+        rate = 1 / (n_rows * module.period)
+        if n_rows == 1.0 or not (every or rate < MIN_UPDATE_RATE):
+            continue
+        repeats = UpdateFilter(rate, skips_zeros=skips_zeros(module.sensor))
         rows = zip(module.times.tolist(), module.readings, strict=True)
         kept = [repeats.is_update(time, reading) for time, reading in rows]
         times, readings = module.times[kept], module.readings[kept]
         updates[name] = replace(module, times=times, readings=readings)
+    if not updates:
+        return recording
     return replace(recording, modules={**recording.modules, **updates})
 
 

@@ -76,6 +76,7 @@ static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
     const hf_real fields[4] = {0, 130, HF_INFINITY, 0};
     finger->max_field = fields[take(in, 1) % 4];
     finger->is_magnetic = finger->max_field > 0;
+    finger->rests_at_zero = take(in, 1) % 2;
     finger->max_step = (hf_real)0.1;
     finger->normal[2] = 1;
     finger->sigma_window = 6;

@@ -2,8 +2,11 @@ import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault
+from holdfast.detection import Model
+from holdfast.devices.sources.base import Arrival
 from holdfast.live.source_filter import RateMonitor
 from holdfast.live.stream_detector import StreamDetector
+from holdfast.sensors import sensor
 
 from . import build
 
@@ -86,3 +89,44 @@ def test_a_recording_is_not_watched():
         update = detector.update(arrival._replace(time=k / (150 if k < 200 else 50)))
         assert update.arrival.notices == ()
     assert Fault.RATE not in update.estimates[-1].estimate.fingers["thumb"].faults
+
+
+def monitored(readings, rate=100.0):
+    """Return for each row whether the stream detector reports the fault `slow`."""
+    skin = sensor("uskin-4x4")
+    detector = StreamDetector(Model.load("builtin:any"), build.Script({"thumb": skin}))
+    found = []
+    for k, sample in enumerate(readings):
+        update = detector.update(Arrival(k / rate, {"thumb": sample}, k / rate))
+        for one in update.estimates:
+            thumb = one.estimate.fingers["thumb"]
+            assert Fault.SLOW not in thumb.faults or thumb.state is ContactState.UNKNOWN
+            found.append(Fault.SLOW in thumb.faults)
+    return np.array(found)
+
+
+def noisy(n):
+    return np.rint(30_000 + np.random.default_rng(0).normal(scale=3, size=(n, 16, 3)))
+
+
+@pytest.mark.parametrize(("rate", "n_rows"), [(100, 10), (150, 15), (100, 20), (150, 30)])
+@pytest.mark.parametrize("between", ["copies", "zeros", "late"])
+def test_a_finger_that_updates_too_slowly_is_slow(rate, n_rows, between):
+    readings = np.repeat(noisy(40), n_rows, axis=0)
+    if between == "zeros":
+        readings[np.arange(len(readings)) % n_rows != 0] = 0
+    if between == "late":  # every other update comes two rows later
+        late = np.arange(len(readings)) // n_rows % 2 * (np.arange(len(readings)) % n_rows < 2)
+        readings = readings[np.arange(len(readings)) - 2 * late]
+    found = monitored(readings, rate)
+    assert found[10 * n_rows :].all()
+
+
+@pytest.mark.parametrize("n_rows", [1, 2, 3])
+def test_a_finger_that_updates_at_thirty_hertz_or_more_is_not_slow(n_rows):
+    assert not monitored(np.repeat(noisy(600 // n_rows), n_rows, axis=0)).any()
+
+
+def test_a_coarse_finger_at_rest_is_not_slow():
+    changed = np.random.default_rng(1).random((6000, 16, 3)) < 0.05 / 48
+    assert not monitored(30_000.0 + changed.cumsum(axis=0)).any()

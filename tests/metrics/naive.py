@@ -69,5 +69,9 @@ def latest(times, codes, instant):
 
 
 def hand(fingers, at, n_model_fingers):
+    """A code of 4 is a dead finger."""
     codes = ([latest(times, codes, t) for times, codes in fingers] for t in at)
-    return [hand_state(np.array(each, dtype=np.int8), n_model_fingers) for each in codes]
+    return [
+        hand_state(np.array([c for c in each if c < 4]), n_model_fingers, each.count(4))
+        for each in codes
+    ]

@@ -1,4 +1,5 @@
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -51,6 +52,19 @@ tracks = st.lists(
     min_size=1,
     max_size=4,
 )
+
+
+@given(tracks, st.integers(1, 4))
+def test_the_hand_without_its_dead_fingers_equals_one_instant_after_another(raw, n_model_fingers):
+    """Two in three UNKNOWN samples are dead."""
+    pairs = [sorted(track) for track in raw]
+    each = [([t for t, _ in track], [c or 4 * (t % 3 > 0) for t, c in track]) for track in pairs]
+    fingers = {
+        str(i): replace(finger(times, np.array(codes, dtype=int) % 4), dead=np.array(codes) == 4)
+        for i, (times, codes) in enumerate(each)
+    }
+    hand = hand_decisions(fingers, n_model_fingers)
+    assert hand.states.tolist() == naive.hand(each, hand.times, n_model_fingers)
 
 
 @given(tracks, st.integers(1, 4))

@@ -175,6 +175,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
         "is_magnetic": bool(sensor.magnetic),
+        "rests_at_zero": sensor.rests_at_zero,
         # The load of the start, when it goes, may look like a field.
         "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
         if sensor.magnetic and not plan.zero_unknown

@@ -117,6 +117,12 @@ class FingerTrace(NamedTuple):
     def __len__(self) -> int:
         return len(self.times)
 
+    @property
+    def is_dead(self) -> Flags:
+        """(n,) whether the readings never changed: the finger does not count for the hand."""
+        dead = self.faults >> tuple(Fault).index(Fault.DEAD) & 1
+        return np.asarray((dead == 1) & ~self.faulty_taxels.any(axis=1))
+
     def estimate(self, k: int) -> ContactEstimate:
         """Return the estimate of sample k."""
         return self.estimates(slice(k, k + 1 or None))[0]

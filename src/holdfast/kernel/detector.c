@@ -1,23 +1,43 @@
 /* The detector: a sample of a hand through the kernel and the decisions; tables and memory. */
 #include "decision.h"
 
+/* Return whether a finger is dead as a whole. */
+static bool hf_is_absent(const holdfast_values *values)
+{
+    if (!(values->faults & HOLDFAST_DEAD)) {
+        return false;
+    }
+    uint64_t named = 0;
+    for (size_t k = 0; k < HOLDFAST_MASK_WORDS; ++k) {
+        named |= values->taxels.words[k];
+    }
+    return named == 0;
+}
+
 static int32_t hf_hand_state(const holdfast_model *model, const holdfast_detector_memory *d)
 {
     /* UNSTABLE if any finger is, else UNKNOWN if any is, else STABLE if two are in stable contact
-     * (one, for a model of one finger), else NO_CONTACT. */
-    size_t n_stable = 0, n_unknown = 0;
+     * (one, for a model of one finger, or if only one is not dead), else NO_CONTACT. Fingers that
+     * are dead do not count; a hand of these is UNKNOWN. */
+    size_t n_stable = 0, n_unknown = 0, n_alive = HF_N_FINGERS(model->hand);
     for (size_t i = 0; i < HF_N_FINGERS(model->hand); ++i) {
         const int32_t state = d->decisions[i].state;
+        if (hf_is_absent(&d->memory.values[i])) {
+            n_alive -= 1;
+            continue;
+        }
         if (state == HOLDFAST_UNSTABLE) {
             return HOLDFAST_UNSTABLE;
         }
         n_unknown += state == HOLDFAST_UNKNOWN;
         n_stable += state == HOLDFAST_STABLE;
     }
-    if (n_unknown > 0) {
+    if (n_unknown > 0 || n_alive == 0) {
         return HOLDFAST_UNKNOWN;
     }
-    return n_stable >= (model->n_model_fingers > 1 ? 2 : 1) ? HOLDFAST_STABLE : HOLDFAST_NO_CONTACT;
+    const bool by_one =
+        model->n_model_fingers <= 1 || (n_alive == 1 && HF_N_FINGERS(model->hand) > 1);
+    return n_stable >= (by_one ? 1 : 2) ? HOLDFAST_STABLE : HOLDFAST_NO_CONTACT;
 }
 
 /* Return why the finger has its state, if its probability does not say it. */
@@ -67,6 +87,9 @@ HF_API int32_t holdfast_detect(
         const holdfast_rule *const rule = &model->rules[i];
         holdfast_decision *const decision = &d->decisions[i];
         int contact = HF_IN_CONTACT;
+        if (!f.state->is_alive && f.values->reason == HOLDFAST_READY) {
+            f.values->reason = HOLDFAST_WARM_UP; /* constants are no contact, nor the lack of one */
+        }
         if (present[i] && f.values->reason == HOLDFAST_READY) {
             contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
         }

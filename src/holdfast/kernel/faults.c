@@ -106,6 +106,42 @@ HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *fault
     return invalid;
 }
 
+/* Return whether no reading of a finger has changed since the first sample, for long. */
+HF_SHARED bool hf_is_dead(const hf_finger *f)
+{
+    /* Dead: for max(0.5 s, 10 samples). Noise of a step / 3 or more changes a reading at 1 of 6
+     * samples at least, so 15 readings of a living skin are all the same that long with a chance
+     * of 1e-12. One with far less noise may rest so: it is alive from its first change on. */
+    const hf_real least = hf_max(HF_STUCK_SECONDS / f->hand->period, HF_MIN_CHANGES);
+    return !f->state->is_alive && (hf_real)f->state->n_constant >= least;
+}
+
+/* Return whether nearly all taxels changed at once since the last valid sample. */
+HF_SHARED bool hf_are_moving(const hf_finger *f)
+{
+    const hf_real *const now = f->readings, *const then = f->previous;
+    const size_t n = f->n;
+    hf_real n_moving = 0;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        n_moving +=
+            now[i] != then[i] || now[n + i] != then[n + i] || now[2 * n + i] != then[2 * n + i];
+    }
+    return f->finger->n_used >= HF_MIN_TAXELS && n_moving >= HF_MOVING_SHARE * f->finger->n_used;
+}
+
+/* Note whether the readings of a finger, valid or not, have changed since the first sample. */
+HF_SHARED void hf_note_constant(const hf_finger *f, const hf_scan *scan)
+{
+    holdfast_finger_memory *const s = f->state;
+    if (s->is_alive || !isfinite(scan->total)) {
+        return;
+    }
+    const bool rests = f->finger->rests_at_zero && scan->least == 0 && scan->most == 0;
+    s->is_alive = rests || (s->n_constant > 0 && scan->total != s->constant_sum);
+    s->constant_sum = scan->total;
+    s->n_constant += 1;
+}
+
 /* Return whether the readings of a finger stopped changing after they had changed.
  *
  * A sensor with a dead band, or with less noise than a step of its readings, rests while nothing

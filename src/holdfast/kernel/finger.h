@@ -237,6 +237,9 @@ typedef struct {
 HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings);
 HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high);
 HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults);
+HF_SHARED bool hf_is_dead(const hf_finger *f);
+HF_SHARED bool hf_are_moving(const hf_finger *f);
+HF_SHARED void hf_note_constant(const hf_finger *f, const hf_scan *scan);
 HF_SHARED bool hf_is_stuck(const hf_finger *f);
 HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
 HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
@@ -271,5 +274,6 @@ HF_SHARED void hf_clear_values(holdfast_values *values);
 
 /* tables.c */
 HF_SHARED bool hf_are_finite(const hf_real *values, size_t n);
+HF_SHARED void hf_begin_finger(const hf_finger *f);
 
 #endif

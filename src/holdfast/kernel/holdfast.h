@@ -148,7 +148,8 @@ enum {
     HOLDFAST_STUCK = 2,         /* readings changed, and do not any more */
     HOLDFAST_SATURATED = 4,     /* a reading is at a limit of its range */
     HOLDFAST_TARE_LOADED = 8,   /* the tare was taken under load: something pulls the skin */
-    HOLDFAST_DEAD = 16,         /* a taxel never changed, while others do */
+    HOLDFAST_DEAD = 16,         /* a taxel never changed, while others do; if none is named: the
+                                   whole finger, which does not count for the hand */
     HOLDFAST_NOISY = 32,        /* a taxel jumps by far more than its noise */
     HOLDFAST_OUT_OF_RANGE = 64, /* a reading that the sensor cannot send */
     HOLDFAST_TARE_DRIFT = 128,  /* the force without contact crept over the threshold of contact */
@@ -270,6 +271,7 @@ typedef struct {
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */
     size_t ready_window;    /* samples of a stretch from which on all features are known */
     bool is_magnetic;       /* each taxel is a magnetometer */
+    bool rests_at_zero;     /* without contact all readings are exactly 0: they prove no fault */
     bool bridges;           /* all windows are in seconds: gaps of up to 0.1 s are bridged */
 } holdfast_finger;
 
@@ -355,7 +357,8 @@ typedef struct {
     const holdfast_rule *rules; /* (n_fingers) */
     const hf_real *weights;     /* (n_weights) */
     size_t n_weights;
-    size_t n_model_fingers; /* a hand of one is STABLE by one finger, else by two */
+    size_t n_model_fingers; /* a hand of one is STABLE by one finger, else by two; but by one if
+                               all others are dead */
     hf_real hysteresis;     /* of the threshold of stability, on both sides */
     hf_real min_duration;   /* that a state must last before it is reported [s] */
     hf_real hold;           /* time for which UNSTABLE is held [s] */
@@ -385,8 +388,8 @@ typedef struct {
 
 /* Each file can be compiled by itself: then HF_SHARED, before functions that files share, and
  * HF_API, before those of the interface, give names to the linker. A file that joins the others
- * (holdfast.c) defines HF_SHARED as static: compilers then see all functions, and an exported header
- * is part of each source file that includes it. */
+ * (holdfast.c) defines HF_SHARED as static: compilers then see all functions, and an exported
+ * header is part of each source file that includes it. */
 #ifndef HF_API
 #ifdef HF_SHARED
 #define HF_API static inline

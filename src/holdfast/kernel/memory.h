@@ -79,6 +79,7 @@ typedef struct {
     int64_t n_seen;    /* valid samples so far */
     int64_t n_stretch; /* forces since a gap, a refused sample or a fault: the windows hold these */
     bool after_gap;    /* a stretch after a gap warms up */
+    bool is_alive;     /* a reading has changed, or the finger rests at zero as it may (faults.c) */
     size_t row;        /* of the newest force in the rings of history and blocks */
     /* Tare and noise (tare.c). */
     bool is_tared;         /* the baseline is frozen */
@@ -89,6 +90,8 @@ typedef struct {
     hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
+    int64_t n_constant;    /* samples before the first that changed a reading */
+    hf_real constant_sum;  /* weighted sum of their readings, see hf_scan */
     int64_t n_unchanged;   /* samples since the readings last changed */
     int64_t n_changes;     /* samples that changed the readings */
     int64_t longest_rest;  /* most samples without a change, if long and not by a fault */

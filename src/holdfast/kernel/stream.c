@@ -1,5 +1,5 @@
-/* One sample of a hand, in the order of holdfast.h: is it valid and plausible, changes, tare, field,
- * masks, force and features. */
+/* One sample of a hand, in the order of holdfast.h: is it valid and plausible, changes, tare,
+ * field, masks, force and features. */
 #include "finger.h"
 
 /* Return one finger of a hand: its constants, and its part of the memory. */
@@ -158,6 +158,25 @@ static bool hf_replace_or_refuse(
     return hf_replace_invalid(f, &invalid);
 }
 
+/* Note whether the readings of a finger have changed. Begin again, with a new tare, if all taxels
+ * of one that was dead do at once: it was plugged in, and its constants were no zero. A tare that
+ * is given stays. */
+static void hf_note_life(const hf_finger *f, const hf_scan *scan, double time)
+{
+    holdfast_finger_memory *const s = f->state;
+    const bool was_dead = hf_is_dead(f);
+    const int32_t tare = f->hand->tare_kind;
+    hf_note_constant(f, scan);
+    if (was_dead && s->is_alive && s->n_seen > 0 && hf_are_moving(f) &&
+        (tare == HOLDFAST_TARE_SECONDS || tare == HOLDFAST_TARE_FIRST)) {
+        memset(s, 0, sizeof *s);
+        hf_begin_finger(f);
+        hf_fill(f->baseline, 3 * f->n, 0);
+        s->last_time = time;
+        s->is_alive = true;
+    }
+}
+
 /* Process a sample of one finger. Return its reason; its faults are in the values. */
 static int32_t hf_process(const hf_finger *f, double time)
 {
@@ -184,9 +203,13 @@ static int32_t hf_process(const hf_finger *f, double time)
     if (has_jumps || !hf_are_valid(f, &scan)) {
         if (!hf_replace_or_refuse(f, &scan, has_jumps ? &jumps : NULL)) {
             s->n_stretch = 0;
+            hf_note_constant(f, &scan);
             return HOLDFAST_FAULT;
         }
         scan = hf_scan_readings(f, f->readings);
+    }
+    if (!s->is_alive) {
+        hf_note_life(f, &scan, time);
     }
     /* Before the sample is counted: an implausible one reaches no tare, force or window. */
     const uint32_t implausible = hf_find_implausible(f, &scan);
@@ -360,6 +383,11 @@ HF_API void holdfast_advance(
         if (present[i]) {
             hf_copy_to_lanes(&f, readings, f.readings);
             f.values->reason = hf_process(&f, time);
+            if (!f.state->is_alive && hf_is_dead(&f)) {
+                f.values->reason = HOLDFAST_FAULT;
+                f.values->faults = HOLDFAST_DEAD;
+                hf_clear(&f.values->taxels);
+            }
             hf_compute_own(&f, hand->features + i * width, memory->own + i * width);
         }
     }

@@ -229,7 +229,7 @@ HF_API const char *holdfast_check(const holdfast_hand *hand)
     return wrong;
 }
 
-static void hf_begin_finger(const hf_finger *f)
+HF_SHARED void hf_begin_finger(const hf_finger *f)
 {
     holdfast_finger_memory *const s = f->state;
     s->first_time = s->last_time = NAN;
@@ -241,6 +241,8 @@ static void hf_begin_finger(const hf_finger *f)
     f->values->reason =
         f->hand->tare_kind == HOLDFAST_TARE_SECONDS ? HOLDFAST_TARE : HOLDFAST_WARM_UP;
     hf_fill(f->sums, HF_N_RING_SUMS, HF_NAN);
+    hf_fill(f->relative, HF_N_LAGS(f->hand) * HOLDFAST_N_RELATIVE, HF_NAN);
+    hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_SECONDS, HF_NAN);
     for (size_t i = 0; i < f->n; ++i) {
         f->taxels[i].changed_at = f->used[i] > 0 ? 0 : INT64_MAX; /* never still */
     }
@@ -249,7 +251,7 @@ static void hf_begin_finger(const hf_finger *f)
 HF_API void holdfast_begin(
     const holdfast_hand *hand, holdfast_memory *memory, const hf_real *baseline)
 {
-    const size_t width = HF_N_FEATURES(hand), n_lags = HF_N_FINGERS(hand) * HF_N_LAGS(hand);
+    const size_t width = HF_N_FEATURES(hand);
 #ifdef HOLDFAST_N_FINGERS
     memset(memory, 0, sizeof *memory);
 #else
@@ -258,8 +260,6 @@ HF_API void holdfast_begin(
     hf_fill(memory->features, HF_N_FINGERS(hand) * width, HF_NAN);
     hf_fill(memory->own, HF_N_FINGERS(hand) * width, HF_NAN);
     hf_fill(memory->of_hand, width, HF_NAN);
-    hf_fill(memory->relative, n_lags * HOLDFAST_N_RELATIVE, HF_NAN);
-    hf_fill(memory->averages, n_lags * HF_N_SECONDS, HF_NAN);
     for (size_t i = 0; i < HF_N_FINGERS(hand); ++i) {
         const hf_finger f = hf_finger_of(hand, memory, i);
         hf_begin_finger(&f);

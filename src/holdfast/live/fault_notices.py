@@ -46,7 +46,9 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         "if it stays, z of the sensor points inwards (docs/sensors.md)",
     ),
     Fault.DEAD: FaultText(
-        "dead", "taxels have not changed since the start: leave them out by --ignore FINGER:TAXEL"
+        "dead",
+        "readings have not changed since the start: check the cable of a finger that is dead as a "
+        "whole, and leave single taxels out by --ignore FINGER:TAXEL",
     ),
     Fault.NOISY: FaultText(
         "noisy", "taxels are far noisier than others: leave them out by --ignore FINGER:TAXEL"
@@ -85,6 +87,11 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     ),
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
+    ),
+    Fault.SLOW: FaultText(
+        "slow",
+        "readings change less than 30 times a second, and are repeated between: raise the rate of "
+        "the sensor, not that of its server",
     ),
 }
 """Texts of every fault, for pages and terminals."""

@@ -6,19 +6,26 @@ No clock, no thread, no I/O: the times are those of the arrivals.
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.contact import Fault, Reason
-from holdfast.detection import Model
+from holdfast.detection import EXACT_RATE, Model
 from holdfast.devices.sources.base import Arrival, ModuleSamples
 from holdfast.errors import ModelError
 from holdfast.live.readings_monitor import ReadingsMonitor
 from holdfast.recordings import GAP_PERIODS
-from holdfast.resampling import MIN_UPDATE_RATE, Resampler, UpdateFilter, rows_per_update
+from holdfast.resampling import (
+    CHANGED_SHARE,
+    MIN_COMPARED_TAXELS,
+    MIN_UPDATE_RATE,
+    Resampler,
+    UpdateFilter,
+    held_rows,
+    skips_zeros,
+)
 from holdfast.sensors import Sensor
 
 MAX_RATE_CHANGE = 0.2
@@ -37,6 +44,9 @@ MAX_BUFFERED_ARRIVALS = 4096
 
 The clock of a device may stand still, so the time alone does not limit it."""
 
+SLOW_UPDATES = 8
+"""Number of updates that show that a finger is slow: 0.8 s at 10 Hz."""
+
 FingerFaults = Mapping[str, tuple[Fault, ...]]
 """Faults by finger."""
 
@@ -51,15 +61,15 @@ def measure_rate(arrivals: Iterable[Arrival], fingers: Iterable[str]) -> float |
     return float(np.median(rates)) if rates else None
 
 
-def measure_hold(arrivals: Iterable[Arrival], fingers: Iterable[str]) -> float:
-    """Return how many rows the sensors hold each sample; 1 if one of them does not."""
+def measure_hold(arrivals: Iterable[Arrival], fingers: Mapping[str, Sensor], rate: float) -> float:
+    """Return how many rows of a rate [Hz] the sensors hold each sample; 1 if one does not."""
     rows = []
-    for name in fingers:
+    for name, sensor in fingers.items():
         samples = [arrival.samples[name] for arrival in arrivals if name in arrival.samples]
         if samples:
-            changed = [not np.array_equal(*pair, equal_nan=True) for pair in pairwise(samples)]
-            rows.append(rows_per_update([True, *changed]))
-    return float(np.median(rows)) if rows and min(rows) > 1.0 else 1.0
+            rows.append(held_rows(np.array(samples), sensor, rate))
+    known = [n_rows for n_rows in rows if n_rows is not None]
+    return float(np.median(known)) if min(known, default=1.0) > 1.0 else 1.0
 
 
 class RateMonitor:
@@ -108,6 +118,39 @@ class RateMonitor:
         return notices
 
 
+class _Updates:
+    """Newest updates of a finger: the last reading, when it came, and the updates before it."""
+
+    def __init__(self, sensor: Sensor) -> None:
+        self._skips_zeros = skips_zeros(sensor)
+        self._reading: npt.NDArray[Any] | None = None
+        self._time, self._n_rows = math.nan, 0
+        # Of each update: the time [s] and the rows since the one before; whether most taxels
+        # changed.
+        self._steps: deque[tuple[float, int, bool]] = deque(maxlen=SLOW_UPDATES)
+        self.is_slow = False
+
+    def add(self, reading: npt.NDArray[Any], time: float) -> None:
+        """Add a row. A sensor is slow that updates evenly, or all at once, with rows between."""
+        before, self._n_rows = self._reading, self._n_rows + 1
+        if self._skips_zeros and not reading.any():
+            return
+        if before is not None:
+            both_nan = np.isnan(reading) & np.isnan(before)
+            differ = ((reading != before) & ~both_nan).any(axis=1)
+            if not differ.any():
+                return
+            at_once = len(differ) >= MIN_COMPARED_TAXELS and differ.mean() >= CHANGED_SHARE
+            self._steps.append((time - self._time, self._n_rows, bool(at_once)))
+        self._reading, self._time, self._n_rows = np.array(reading), time, 0
+        if len(self._steps) < SLOW_UPDATES:
+            return
+        steps, rows, at_once_each = zip(*self._steps, strict=True)
+        is_held = all(at_once_each) or max(rows) - min(rows) <= 1
+        longest = 1 / (MIN_UPDATE_RATE * (1 - EXACT_RATE))
+        self.is_slow = is_held and bool(np.median(steps) > longest and np.median(rows) > 1)
+
+
 class FilteredSamples(NamedTuple):
     """Samples of one instant for the detector, and which fingers the stream makes UNKNOWN.
 
@@ -130,7 +173,8 @@ class SourceFilter:
     It buffers the first half second, until it has measured the rate of the source. Of a
     sample-and-hold sensor it takes the true updates. It resamples a source whose rate is not
     within 20 % of the model's. It leaves out modules that the model does not use, and keeps the
-    faults of the stream until the next sample of their finger.
+    faults of the stream until the next sample of their finger. A finger has the fault SLOW while it
+    updates under 30 times a second in rows that repeat the reading, or are zero.
 
     Args:
         fingers: sensor of each finger that the model uses.
@@ -158,6 +202,7 @@ class SourceFilter:
         self._monitor: RateMonitor | None = None
         self._time = -math.inf  # of the newest samples that were resampled
         self._faults: dict[str, tuple[Fault, ...]] = {}  # until the next sample of the finger
+        self._last_updates = {name: _Updates(sensor) for name, sensor in fingers.items()}
         self._silent: set[str] = set()  # set by `mark_silent`, until the next sample likewise
         self.compare_from_now()
 
@@ -210,14 +255,17 @@ class SourceFilter:
     def _begin(self, rate: float, model: Model) -> Iterator[FilteredSamples]:
         """Choose what the rate [Hz] needs, and process the buffer."""
         # The true updates first, as offline: rows that repeat are no samples of a faster sensor.
-        n_rows = measure_hold(self._buffer, self._fingers)
+        n_rows = measure_hold(self._buffer, self._fingers, rate)
         if n_rows > 1.0 and rate / n_rows >= MIN_UPDATE_RATE:
             self.notices.append(
                 f"readings repeat in rows of {rate:.4g} Hz; the true updates are used, "
                 f"{rate / n_rows:.4g} Hz"
             )
             rate /= n_rows
-            self._updates = {name: UpdateFilter(rate) for name in self._fingers}
+            self._updates = {
+                name: UpdateFilter(rate, skips_zeros=skips_zeros(sensor))
+                for name, sensor in self._fingers.items()
+            }
         self.rate = rate
         if model.rate is not None and not model.rate_fits(rate):
             if self._strict:
@@ -242,6 +290,7 @@ class SourceFilter:
         self._faults.update(arrival.faults)
         time, used = arrival.time, arrival.samples
         used = {name: used[name] for name in self._fingers if name in used}
+        self._find_slow(used, time)
         if self._updates:
             used = {n: new for n, new in used.items() if self._updates[n].is_update(time, new)}
         if self._monitor is not None:
@@ -265,6 +314,13 @@ class SourceFilter:
                 # Every module has its own instants, and one may lag: times must increase.
                 self._time = max(when, math.nextafter(self._time, math.inf))
                 yield FilteredSamples(self._time, instants[when], (), hidden)
+
+    def _find_slow(self, samples: ModuleSamples, time: float) -> None:
+        """Add the fault SLOW to the fingers whose rows pretend a rate."""
+        for name, sample in samples.items():
+            self._last_updates[name].add(np.asarray(sample), time)
+            if self._last_updates[name].is_slow:
+                self._faults[name] = (*self._faults.get(name, ()), Fault.SLOW)
 
     def _hidden(self) -> tuple[tuple[FingerFaults, Reason], ...]:
         """Return the faults that hold now; a silent finger is rather a gap than a fault."""

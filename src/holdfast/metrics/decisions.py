@@ -11,7 +11,7 @@ import numpy.typing as npt
 from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, enough_contacts, hand_states
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.truth_labels import Onsets, common_onsets
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags
 
 Codes = npt.NDArray[np.int8]
 
@@ -33,6 +33,7 @@ class FingerDecisions:
             margin around a disturbance.
         onsets: where the exact labels come from.
         slip: decisions about slips; None for a hand, or a model without a slip rule.
+        dead: (n,) whether the finger is dead, and does not count for the hand; None for never.
 
     Raises:
         ValueError: the lengths of the arrays differ, or the times do not increase.
@@ -45,6 +46,7 @@ class FingerDecisions:
     exact_labels: Codes | None = None
     slip: SlipDecisions | None = None
     onsets: Onsets = "truth"
+    dead: Flags | None = None
 
     def __post_init__(self) -> None:
         arrays: dict[str, npt.NDArray[Any]] = {
@@ -55,6 +57,8 @@ class FingerDecisions:
         }
         if self.exact_labels is not None:
             arrays["exact_labels"] = np.asarray(self.exact_labels, dtype=np.int8)
+        if self.dead is not None:
+            arrays["dead"] = np.asarray(self.dead, dtype=np.bool_)
         check_lengths(**arrays)
         check_times(arrays["times"])
         for name, array in arrays.items():
@@ -117,25 +121,34 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
     hand = list(fingers.values())
     times = np.unique(np.concatenate([np.empty(0), *(finger.times for finger in hand)]))
 
-    def of_hand(codes: Sequence[Codes]) -> Codes:
-        # (n_fingers, n) latest code of each finger at each instant: index 0, before its first
-        # sample, is UNKNOWN.
-        table = np.full((len(hand), len(times)), UNKNOWN, dtype=np.int8)
-        for row, finger, states in zip(table, hand, codes, strict=True):
-            latest = np.searchsorted(finger.times, times, side="right")
-            row[:] = np.concatenate([[UNKNOWN], states])[latest]
-        unstable, unknown = (table == UNSTABLE).any(axis=0), (table == UNKNOWN).any(axis=0)
-        in_grasp = enough_contacts((table == STABLE).sum(axis=0), n_model_fingers)
-        return hand_states(unstable, unknown, in_grasp)
+    def latest(values: Sequence[npt.NDArray[Any] | None]) -> npt.NDArray[np.int8]:
+        # (n_fingers, n) latest value of each finger at each instant: index 0, before its first
+        # sample, is UNKNOWN, or not dead.
+        table = np.zeros((len(hand), len(times)), dtype=np.int8)
+        for row, finger, own in zip(table, hand, values, strict=True):
+            if own is not None:
+                at = np.searchsorted(finger.times, times, side="right")
+                row[:] = np.concatenate([[UNKNOWN], own])[at]
+        return table
 
+    def of_hand(codes: Sequence[Codes], dead: Flags) -> Codes:
+        table, n_alive = latest(codes), (~dead).sum(axis=0)
+        unknown = ((table == UNKNOWN) & ~dead).any(axis=0) | dead.all(axis=0)
+        is_last = dead.any(axis=0) & (n_alive == 1)
+        n_contacts, n_able = (table == STABLE).sum(axis=0), np.where(is_last, 1, n_model_fingers)
+        held = enough_contacts(n_contacts, n_able)
+        return hand_states((table == UNSTABLE).any(axis=0), unknown, held)
+
+    dead = latest([finger.dead for finger in hand]) != 0
+    labels = of_hand([finger.labels for finger in hand], np.zeros_like(dead))
     # Exact labels of some fingers alone would mix events of two kinds in the hand.
     exact = [finger.exact_labels for finger in hand if finger.exact_labels is not None]
     return FingerDecisions(
         times,
-        of_hand([finger.labels for finger in hand]),
-        of_hand([finger.states for finger in hand]),
+        labels,
+        of_hand([finger.states for finger in hand], dead),
         np.full(len(times), np.nan),
-        of_hand(exact) if hand and len(exact) == len(hand) else None,
+        of_hand(exact, np.zeros_like(dead)) if hand and len(exact) == len(hand) else None,
         onsets=common_onsets({finger.onsets for finger in hand}),
     )
 

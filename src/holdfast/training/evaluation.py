@@ -90,6 +90,7 @@ def compute_decisions_and_tare(model: Model, recording: Recording) -> tuple[Deci
             exact_labels=label_states(exact[name], trace.times) if name in exact else None,
             slip=slip,
             onsets="rule" if by_rule else "truth",
+            dead=trace.is_dead,
         )
     hand = replace(hand_decisions(fingers, len(model.fingers)), states=detection.hand)
     return Decisions(recording.name, fingers, hand), loaded

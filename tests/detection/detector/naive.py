@@ -160,7 +160,11 @@ class Mask:
 
 
 class Finger:
+    others = ()
+
     def __init__(self, sensor, part, window, tare, period, ignored=()):
+        self.arguments = sensor, part, window, tare, period, ignored
+        self.unchanged, self.alive = [], False
         self.used = [i for i in range(sensor.n_taxels) if i not in ignored]
         self.taxels = {i: Taxel(min(1, period / 0.25)) for i in self.used}
         self.rotations = sensor.rotations[self.used]
@@ -182,7 +186,7 @@ class Finger:
         self.field = self.still_field = np.zeros(3)
         self.common, self.speeds = np.zeros((2, 3)), np.zeros((2, 3))
         self.is_turned, self.is_load, self.n_unclear = False, False, 0
-        self.others, self.field_speed, self.is_shared = (), 0.0, False
+        self.field_speed, self.is_shared = 0.0, False
         self.is_deep, self.n_skipped = False, 0
         self.stretch = []  # forces since the last interruption
         self.last = None
@@ -215,6 +219,29 @@ class Finger:
         self.faulty_taxels = tuple(sorted(taxels))
 
     def take(self, time, given):
+        self.take_living(time, given)
+        if self.is_dead():
+            self.status, self.faults, self.faulty_taxels = "fault", ("dead",), ()
+
+    def is_dead(self):
+        """Whether no reading has changed for half a second, and ten samples, from the first on."""
+        return not self.alive and len(self.unchanged) >= max(0.5 / self.period, 10)
+
+    def watch_life(self, readings, time):
+        """Whether any reading changes; a dead finger of which all taxels do begins anew."""
+        if self.alive or not np.isfinite(readings).all():
+            return
+        dead, rests = self.is_dead(), getattr(self.sensor, "rests_at_zero", False)
+        self.alive = bool(self.unchanged and (readings != self.unchanged[-1]).any())
+        self.alive |= rests and not readings.any()
+        self.unchanged.append(readings.copy())
+        if dead and self.alive and self.samples and self.kind in ("seconds", "first"):
+            changed = (self.samples[-1][1] != readings).any(axis=1).sum()
+            if len(self.used) >= 4 and changed >= 0.8 * len(self.used):
+                self.__init__(*self.arguments)
+                self.last, self.alive = time, True
+
+    def take_living(self, time, given):
         readings = np.zeros_like(given)
         readings[self.used] = given[self.used]
         fresh = self.last is not None and time - self.last > 3.0003 * self.period
@@ -235,6 +262,7 @@ class Finger:
             invalid |= bad | outside | jumps
             if self.baseline is None:
                 self.lose(faults, invalid)
+                self.watch_life(readings, time)
                 return self.refuse(faults, invalid)
             for i in bad | outside | jumps:
                 readings[i] = self.samples[-1][1][i]
@@ -246,7 +274,9 @@ class Finger:
                 if not (known or enough):
                     self.mask.unweighed |= masked
             if not enough:
+                self.watch_life(readings, time)
                 return self.refuse(faults, invalid)
+        self.watch_life(readings, time)
         if implausible := self.implausible(readings):
             return self.refuse(faults | implausible, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)
@@ -610,6 +640,8 @@ class Finger:
         return value
 
     def decide(self, time, fingers, debounce):
+        if self.status == "" and not self.alive:
+            self.status = "warm_up"
         if self.status == "":
             features = [self.feature(spec, fingers) for spec in self.part.stable.features]
             if any(math.isnan(value) for value in features):
@@ -800,10 +832,12 @@ class Hand:
         return names, (last, finger.probability, finger.sigma, *finger.force), slip
 
     def state(self):
-        states = [finger.state for finger in self.fingers.values()]
+        fingers = self.fingers.values()
+        alive = [f for f in fingers if "dead" not in f.faults or f.faulty_taxels]
+        states = [finger.state for finger in alive]
         if "UNSTABLE" in states:
             return "UNSTABLE"
-        if "UNKNOWN" in states:
+        if "UNKNOWN" in states or not states:
             return "UNKNOWN"
-        needed = 2 if len(self.fingers) > 1 else 1
+        needed = 2 if len(states) > 1 else 1
         return "STABLE" if states.count("STABLE") >= needed else "NO_CONTACT"

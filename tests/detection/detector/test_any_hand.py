@@ -89,12 +89,15 @@ def test_no_contact_in_the_whole_recording(model):
 
 
 @pytest.mark.parametrize("value", [0.0, 7.0, np.nan])
-def test_a_finger_without_any_signal_makes_no_hand_stable(model, value):
+def test_a_finger_without_any_signal_is_unknown(model, value):
+    """The hand is that of the other finger, but where the readings are no numbers."""
     module = grasp()
     dead = with_readings(module, np.full_like(module.readings, value))
     found = detected(model, index=module, thumb=dead)
-    assert STABLE not in found.fingers["thumb"].state
-    assert STABLE not in found.hand
+    assert not found.fingers["thumb"].state.any()
+    other = found.fingers["index"].state
+    unknown = np.isnan(value) & (other != UNSTABLE) | (found.times < 0.49)
+    np.testing.assert_array_equal(found.hand, np.where(unknown, UNKNOWN, other))
 
 
 @pytest.mark.parametrize("value", [None, 0.0, np.nan])

@@ -57,8 +57,13 @@ FLAT = type(sensor())(
 )  # fmt: skip
 
 
+def flat(fx, k):
+    """Sample k: a change that no force shows, as constant readings are none of a living skin."""
+    return [[fx, 1e-9 * (k % 2), 0.0]]
+
+
 def pushes(detector, forces, finger="finger1", start=0.0):
-    samples = [[[fx, 0.0, 0.0]] for fx in forces]
+    samples = [flat(fx, k) for k, fx in enumerate(forces)]
     return [e.state for e in feed(detector, samples, finger, start)]
 
 
@@ -162,7 +167,7 @@ class TestContactThreshold:
         assert found[1:] == [STABLE, UNSTABLE, UNSTABLE, NO_CONTACT, NO_CONTACT]
 
     def test_the_probability_without_contact_is_zero(self):
-        estimates = feed(Detector(by_force(), {"f": FLAT}), [[[1.0, 0, 0]]] * 3, "f")
+        estimates = feed(Detector(by_force(), {"f": FLAT}), [flat(1.0, k) for k in range(3)], "f")
         assert (estimates[-1].state, estimates[-1].stable_probability) == (NO_CONTACT, 0.0)
 
     def test_by_noise(self):
@@ -245,12 +250,10 @@ def test_states_of_the_hand(fingers, expected):
     forces = {"S": 150.0, "U": 50.0, "-": 0.0}
     names = [f"finger{i + 1}" for i in range(len(fingers))]
     detector = Detector(by_force(), dict.fromkeys(names, FLAT))
-    samples = {
-        name: [[forces[kind], 0.0, 0.0]]
-        for name, kind in zip(names, fingers, strict=True)
-        if kind != "?"
-    }
-    estimate = [detector.update(samples, k / RATE) for k in range(3)][-1]
+    hand = {name: forces[kind] for name, kind in zip(names, fingers, strict=True) if kind != "?"}
+    for k in range(3):
+        samples = {name: flat(force, k) for name, force in hand.items()}
+        estimate = detector.update(samples, k / RATE)
     assert estimate.state is expected
 
 
@@ -258,7 +261,7 @@ class TestEvents:
     def test_changes_in_order(self):
         detector = Detector(by_force(), {"a": FLAT, "b": FLAT})
         for k, (one, two) in enumerate([(150, 150), (150, 150), (50, 150), (150, 0)]):
-            detector.update({"a": [[one, 0, 0]], "b": [[two, 0, 0]]}, float(k) / RATE)
+            detector.update({"a": flat(one, k), "b": flat(two, k)}, float(k) / RATE)
         assert detector.events() == [
             ContactEvent("a", STABLE, UNKNOWN, 0.01),
             ContactEvent("b", STABLE, UNKNOWN, 0.01),
@@ -476,7 +479,7 @@ class TestThresholds:
         detector = Detector(by_force(), {"f": FLAT, "g": FLAT})
         detector.set_thresholds({"f": 0.95})
         for k in range(10):
-            sample = np.array([[110.0, 0.0, 0.0]])
+            sample = flat(110.0, k)
             estimate = detector.update({"f": sample, "g": sample}, k / RATE)
         assert estimate.fingers["f"].state is UNSTABLE
         assert estimate.fingers["g"].state is STABLE

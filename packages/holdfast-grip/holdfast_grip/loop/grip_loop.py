@@ -9,7 +9,7 @@ from typing import Self
 from msgspec import structs
 
 from holdfast.contact import HandEstimate
-from holdfast_grip.command import GripCommand, GripReason, event_texts
+from holdfast_grip.command import GripCommand, GripReason, LoopState, event_texts
 from holdfast_grip.controller import GripController
 from holdfast_grip.errors import HandError
 from holdfast_grip.guard import CommandGuard, safe_command
@@ -85,8 +85,11 @@ class GripLoop:
                 where time passes by the samples alone.
 
         Raises:
-            HandError: the hand refuses the command, or the watchdog has taken over.
+            HandError: the hand refuses the command, the watchdog has taken over, or a finger is
+                dead while the grip of an armed loop has not begun.
         """
+        if self.armed and self.controller.state is LoopState.IDLE:
+            _check_alive(estimate)
         if self.armed and self.hand.silent:
             fault = fault or GripReason.HAND
         for angles in self.hand.joint_reports():
@@ -196,3 +199,12 @@ class GripLoop:
             raise
         command = safe_command(self.last, GripReason.NONE, release=self.last.release)
         self.hand.send(command)
+
+
+def _check_alive(estimate: HandEstimate) -> None:
+    """Raise `HandError` if the readings of a finger never changed."""
+    if dead := [name for name, finger in estimate.fingers.items() if finger.is_dead]:
+        raise HandError(
+            f"{', '.join(dead)}: the readings have not changed since the start (dead), so no grip "
+            "begins: check the cable, or leave the module out of the source (fingers=...)"
+        )

@@ -24,6 +24,7 @@ def finger(name="index", time=0.0, state=ContactState.STABLE, **given):
         given.get("probability", math.nan if unknown else 0.95),
         given.get("instability", 1.0),
         given.get("force", (normal, tangential, 0.0)),
+        given.get("faults", ()),
     )
 
 

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from holdfast.contact import MAX_TAXELS
-from holdfast.detection import RELATIVE_RATES
+from holdfast.detection import EXACT_RATE, RELATIVE_RATES
 from holdfast.errors import HoldfastError
 from holdfast.io.label_files import decode_labels, label_bytes, labels_path
 from holdfast.labelling.review.scan import FindingsScan, ModuleScan
@@ -20,6 +20,7 @@ from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Recording, Tactile, shown_origin
+from holdfast.resampling import skips_zeros
 
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
@@ -46,6 +47,7 @@ FindingKind = Literal[
     "no_labels",
     "copy",
     "cross_talk",
+    "held",
     "invalid",
     "stuck",
 ]
@@ -168,8 +170,12 @@ def report_hidden_labels(paths: Sequence[Path], report: Callable[[str], None]) -
 
 def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
     low, high = RELATIVE_RATES
-    rate = module.force.rate
-    if not low <= rate <= high:
+    rate = module.force.rate / module.rows_per_update
+    if module.rows_per_update > 1:
+        text = f"each reading comes in {module.rows_per_update:.3g} rows of "
+        text += f"{module.force.rate:.4g} Hz: the true updates are used, {rate:.4g} Hz"
+        yield "held", text
+    if not low * (1 - EXACT_RATE) <= rate <= high * (1 + EXACT_RATE):
         yield "rate", f"{rate:.4g} Hz; builtin:any needs {low:g} to {high:g} Hz"
     if module.sensor.n_taxels == 1:
         yield "one_taxel", "one taxel: taxels cannot be compared, only its force is judged"
@@ -178,7 +184,8 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         yield "many_taxels", text + "faults are looked for"
     still = [axis for axis, is_still in zip(AXES, module.still, strict=True) if is_still]
     if len(still) == len(AXES):
-        yield "dead", "the readings never change: the sensor is dead or disconnected"
+        if skips_zeros(module.sensor) or module.lowest != 0 or module.highest != 0:
+            yield "dead", "the readings never change: the sensor is dead or disconnected"
         return
     if still:
         yield "axes", f"readings along {' and '.join(still)} never change; 3 axes are expected"
@@ -212,7 +219,7 @@ DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
     "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "rate", "one_taxel",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel",
     "many_taxels", "no_contact", "no_labels",
 )  # fmt: skip
 

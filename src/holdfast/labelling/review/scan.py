@@ -10,6 +10,7 @@ from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.fingertip_forces import force_sensor
 from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
 from holdfast.recordings import Label, Recording, Tactile
+from holdfast.resampling import HELD_ROWS, held_rows
 from holdfast.sensors.types import Array, Flags
 
 SCAN_BLOCK_SAMPLES = 4096
@@ -28,6 +29,7 @@ class ModuleScan:
         still: (3,) whether no taxel changed along an axis.
         lowest: of all readings [unit of the readings].
         highest: of all readings [unit of the readings].
+        rows_per_update: rows in which each sample comes, in the first part; 1 if in one.
     """
 
     def __init__(self, module: Tactile) -> None:
@@ -35,6 +37,7 @@ class ModuleScan:
         self.labels: list[Label] = []
         self.still: Flags = np.ones(3, dtype=np.bool_)
         self.lowest, self.highest = np.inf, -np.inf
+        self.rows_per_update = 1.0
         # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
         # of its times, and its last sample. The first finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
@@ -56,6 +59,9 @@ class ModuleScan:
                 del labels[0]
         self.labels += labels
         if module.n_samples:
+            if not self._last.size:
+                readings = module.readings[:HELD_ROWS]
+                self.rows_per_update = held_rows(readings, module.sensor, module.rate) or 1.0
             self._times.append(module.times)
             self._end = float(module.times[-1])
         for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):

@@ -1,13 +1,16 @@
 import math
+from contextlib import nullcontext
 
 import pytest
 
 from grip.build import FINGERS, RATE, hand, holding, scales
-from holdfast.contact import ContactState
+from holdfast.contact import ContactState, Fault
 from holdfast_grip import (
     FingerCommand,
     GripCommand,
+    GripController,
     GripReason,
+    Limits,
     LoopState,
 )
 from holdfast_grip.errors import HandError
@@ -84,6 +87,16 @@ def test_a_dry_run_sends_nothing_and_logs_everything(tape):
         stepped(loop, time, index=SLIPPING)
     assert (tape.commands, loop.n_sent, len(texts)) == ([], 0, 1)
     assert texts[0].startswith("grip REACT")
+
+
+@pytest.mark.parametrize("armed", [True, False])
+def test_no_armed_grip_begins_with_a_dead_finger(tape, armed):
+    controller = GripController(Limits(), newtons_per_unit=1e-3)
+    loop = GripLoop(controller, tape, armed=armed)
+    estimate = hand(0.0, ring={"state": ContactState.UNKNOWN, "faults": (Fault.DEAD,)})
+    with pytest.raises(HandError, match=r"ring.*dead") if armed else nullcontext(), loop:
+        loop.step(estimate, 0.0)
+    assert tape.commands == []
 
 
 def test_the_controller_gets_the_joints_of_the_hand_before_the_estimate(tape):
