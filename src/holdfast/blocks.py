@@ -14,14 +14,14 @@ import numpy.typing as npt
 Digests = npt.NDArray[np.uint64]
 
 BLOCK_CHANGES = 32
-"""Number of changes of a block. A noisy skin changes at every sample."""
+"""Number of changes of a block, a power of two. A noisy skin changes at every sample."""
 BLOCK_STRIDE = 32
 """Number of successive blocks of which one counts: any 64 changes contain one that does."""
 MIN_DIFFERENT = 16
 """Least number of different readings of a block that counts. A module at rest that toggles between
 a few readings has fewer; two recordings of it may be alike by chance."""
-HASHED_ROWS = 4096
-"""Number of samples that are hashed at a time: bounds the memory."""
+HASHED_ROWS = 512
+"""Number of samples that are hashed at a time: their arrays stay in the cache."""
 PACKED_BYTES = 5
 """Bytes of a packed digest. With n of them, one of m digests of other readings is equal by chance
 with a probability of n m / 2^40: 4e-6 for 1000 and 4000."""
@@ -44,13 +44,13 @@ def module_blocks(readings: npt.NDArray[np.generic]) -> Digests:
     rows = _hash_rows(readings.reshape(len(readings), math.prod(readings.shape[1:])))
     changed = np.flatnonzero(rows[1:] != rows[:-1]) + 1
     rows = rows[changed[:-1]]
-    n_blocks = len(rows) - BLOCK_CHANGES + 1
-    if n_blocks < BLOCK_STRIDE:
+    if len(rows) < BLOCK_CHANGES + BLOCK_STRIDE - 1:
         return np.empty(0, np.uint64)
-    changes = _mix(rows + _ODD * np.diff(changed).astype(np.uint64))
-    hashes = np.zeros(n_blocks, np.uint64)
-    for k in range(BLOCK_CHANGES):
-        hashes = _ODD * hashes + changes[k : k + n_blocks]
+    hashes = _mix(rows + _ODD * np.diff(changed).astype(np.uint64))
+    n, factor = 1, np.array([_ODD])  # an array: its product wraps around without a warning
+    while n < BLOCK_CHANGES:  # of n changes, then of 2 n
+        hashes = factor * hashes[:-n] + hashes[n:]
+        n, factor = 2 * n, factor * factor
     hashes = _mix(hashes)
     windows = np.lib.stride_tricks.sliding_window_view(hashes, BLOCK_STRIDE)
     least = np.unique(np.arange(len(windows)) + windows.argmin(axis=1))
@@ -89,8 +89,8 @@ def _hash_rows(readings: npt.NDArray[np.generic]) -> Digests:
     rows = np.empty(len(readings), np.uint64)
     for first in range(0, len(readings), HASHED_ROWS):
         # Zero is added so that -0 is 0; the product by einsum takes half the time of that by @.
-        part = readings[first : first + HASHED_ROWS].astype(np.float32) + np.float32(0)
-        bits = np.ascontiguousarray(part).view(np.uint32).astype(np.uint64)
+        part = np.ascontiguousarray(readings[first : first + HASHED_ROWS], np.float32)
+        bits = (part + np.float32(0)).view(np.uint32).astype(np.uint64)
         rows[first : first + HASHED_ROWS] = np.einsum("ij,j->i", bits, weights)
     return rows
 
