@@ -87,11 +87,12 @@ HF_API int32_t holdfast_detect(
         const holdfast_rule *const rule = &model->rules[i];
         holdfast_decision *const decision = &d->decisions[i];
         int contact = HF_IN_CONTACT;
-        if (!f.state->is_alive && f.values->reason == HOLDFAST_READY) {
-            f.values->reason = HOLDFAST_WARM_UP; /* constants are no contact, nor the lack of one */
-        }
         if (present[i] && f.values->reason == HOLDFAST_READY) {
             contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
+            if (!f.state->is_alive && contact != HF_WITHOUT_CONTACT &&
+                f.values->reason == HOLDFAST_READY) {
+                f.values->reason = HOLDFAST_WARM_UP; /* constants prove no contact */
+            }
         }
         /* After the contact: it may report a drift of the tare, a fault. */
         if (f.values->reason != HOLDFAST_READY) {

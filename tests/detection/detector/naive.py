@@ -640,8 +640,6 @@ class Finger:
         return value
 
     def decide(self, time, fingers, debounce):
-        if self.status == "" and not self.alive:
-            self.status = "warm_up"
         if self.status == "":
             features = [self.feature(spec, fingers) for spec in self.part.stable.features]
             if any(math.isnan(value) for value in features):
@@ -649,6 +647,8 @@ class Finger:
             elif self.drifted(time):
                 self.status = "fault"
                 self.faults = (*self.faults, "tare_drift")
+            elif not (self.alive or self.empty):
+                self.status = "warm_up"
         if self.status != "":
             if self.status == "fault" and not math.isnan(self.force[0]):
                 self.debounce("UNKNOWN", time, debounce.min_duration)

@@ -94,10 +94,11 @@ def test_a_finger_without_any_signal_is_unknown(model, value):
     module = grasp()
     dead = with_readings(module, np.full_like(module.readings, value))
     found = detected(model, index=module, thumb=dead)
-    assert not found.fingers["thumb"].state.any()
+    assert not found.fingers["thumb"].state[50:].any()
+    assert STABLE not in found.fingers["thumb"].state
     other = found.fingers["index"].state
-    unknown = np.isnan(value) & (other != UNSTABLE) | (found.times < 0.49)
-    np.testing.assert_array_equal(found.hand, np.where(unknown, UNKNOWN, other))
+    expected = np.where(np.isnan(value) & (other != UNSTABLE), UNKNOWN, other)
+    np.testing.assert_array_equal(found.hand[50:], expected[50:])
 
 
 @pytest.mark.parametrize("value", [None, 0.0, np.nan])
