@@ -23,10 +23,10 @@ from holdfast.contact import (
     faults_of,
     hand_state,
     hand_states,
-    n_mask_words,
     taxels_of,
     with_faults,
 )
+from holdfast.kernel.structs import n_mask_words
 
 NAMES = {"-": NO_CONTACT, "S": STABLE, "U": UNSTABLE, "?": UNKNOWN}
 

@@ -17,6 +17,7 @@ from holdfast.files import (
     whole_file,
     write_whole,
 )
+from traps import traps
 
 
 def test_the_part_has_the_suffix_and_folder_of_the_output(tmp_path):
@@ -151,6 +152,22 @@ def test_an_input_that_may_never_end_is_refused_at_once(tmp_path, read):
         read(tmp_path)
     with pytest.raises(FileNotFoundError):
         read(tmp_path / "none")
+
+
+@traps
+def test_no_link_is_followed_to_a_file_that_only_its_place_names(tmp_path, word, trap):
+    trap(tmp_path / "a")
+    with pytest.raises(OSError, match=rf"it is a {word}.* expected"):
+        read_input(tmp_path / "a", 10, follow=False)
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, lambda path: path.symlink_to("/dev/zero")])
+@pytest.mark.parametrize("follow", [False, True])
+def test_what_takes_the_place_of_a_checked_input_is_refused(tmp_path, monkeypatch, make, follow):
+    make(tmp_path / "a")
+    monkeypatch.setattr("holdfast.files.check_regular", lambda path, **_: None)
+    with pytest.raises(OSError, match=r"regular file|symbolic links"):
+        read_input(tmp_path / "a", 10, follow=follow)
 
 
 def test_a_large_input_is_refused(tmp_path):

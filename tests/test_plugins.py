@@ -24,7 +24,7 @@ from holdfast.devices.uri import SOURCE_PLUGINS, open_source, parse
 from holdfast.errors import PACKAGE_PARTS, HoldfastError, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.foreign import end_children
-from holdfast.io.importers import IMPORTER_PLUGINS
+from holdfast.io.importers import IF_IN_CONTACT, IMPORTER_PLUGINS
 from holdfast.plugins import PluginGroup
 from holdfast.removed import REMOVED
 from holdfast.sensors import sensor
@@ -326,7 +326,7 @@ def test_the_format_of_the_template(run, tmp_path):
     np.savetxt(tmp_path / "press.pins", rows, "%.6f")
     imported = json.loads(run("import", "press.pins", "out", "--json"))
     assert imported["n_samples"] == 200
-    assert imported["hint"].endswith("give --in-contact")
+    assert imported["hint"] == IF_IN_CONTACT
     loaded = holdfast.load_recording(tmp_path / imported["recordings"][0]["path"])
     np.testing.assert_allclose(loaded.modules["finger1"].readings.reshape(200, 18), rows[:, 1:])
     (tmp_path / "bad.pins").write_text("0.0 1 2\n")

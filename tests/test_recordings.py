@@ -120,6 +120,11 @@ class TestTactile:
         assert tactile().unit == "count"
         assert tactile(unit="N").unit == "N"
 
+    def test_calibrated_readings_lose_what_is_known_of_raw_ones(self):
+        raw = replace(sensor("uskin-4x4"), range=(0, 9), step=1.0, rests_at_zero=True)
+        one = Tactile(raw, np.arange(2) / 100, np.zeros((2, 16, 3)), "N").sensor
+        assert (one.range, one.step, one.rests_at_zero) == (None, None, False)
+
     def test_rate_gaps_and_repeats(self):
         times = np.array([0, 1, 2, 3, 7, 8, 9, 10, 11, 12]) / 100
         readings = np.repeat(np.arange(5.0), 2)[:, None, None] * np.ones((5, 3))

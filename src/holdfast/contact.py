@@ -406,11 +406,6 @@ MAX_TAXELS = 512
 """Maximum number of taxels of a sensor in a model or a detector: of a mask in the C kernel."""
 
 
-def n_mask_words(n_taxels: int) -> int:
-    """Return how many words of 64 bits a mask of taxels has."""
-    return -(-n_taxels // 64)
-
-
 def taxels_of(words: bytes | npt.NDArray[np.uint64]) -> tuple[int, ...]:
     """Return the indices of the taxels in a mask: bit i % 64 of word i // 64 is taxel i, from 0.
 

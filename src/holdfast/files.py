@@ -150,37 +150,52 @@ def sync(*files: int | Path) -> None:
                 os.close(handle)
 
 
-def check_regular(path: str | Path) -> None:
+def check_regular(path: str | Path, *, follow: bool = True) -> None:
     """Check that an input is a regular file: reading a pipe or a device may never end.
+
+    Args:
+        path: of the file.
+        follow: accept a link to one.
 
     Raises:
         OSError: it is something else, or does not exist.
     """
-    mode = Path(path).stat().st_mode
-    if stat.S_ISDIR(mode):
-        raise IsADirectoryError(errno.EISDIR, "it is a folder; a file expected", str(path))
-    if not stat.S_ISREG(mode):
-        raise OSError(errno.EINVAL, "it is a pipe or a device; a regular file expected", str(path))
+    _check_mode(path, Path(path).stat(follow_symlinks=follow).st_mode)
 
 
-def read_input(path: str | Path, max_size: int) -> bytes:
-    """Return the content of a small input file.
+def read_input(path: str | Path, max_size: int, *, follow: bool = True) -> bytes:
+    """Return the content of a small input file, which is opened once.
 
     Args:
         path: of the file.
         max_size: number of bytes above which the file is refused.
+        follow: accept a link. False for a file that only its place names, as one beside a
+            recording: a folder of others could lead it anywhere.
 
     Raises:
         OSError: it cannot be read, is no regular file, or is too large.
     """
-    check_regular(path)
-    with Path(path).open("rb") as file:
+    check_regular(path, follow=follow)  # before it is opened, which may move a device
+    # Something else may have its name by now: to open a pipe must not wait for a writer.
+    names = ("O_NONBLOCK", "O_NOCTTY") if follow else ("O_NONBLOCK", "O_NOCTTY", "O_NOFOLLOW")
+    more = sum(getattr(os, name, 0) for name in names)
+    with open(path, "rb", opener=lambda name, flags: os.open(name, flags | more)) as file:
+        state = os.fstat(file.fileno())
+        _check_mode(path, state.st_mode)
         # As long as it says, not `max_size`: Python takes that memory before it reads.
-        size = min(os.fstat(file.fileno()).st_size, max_size)
-        data = file.read(size + 1)
+        data = file.read(min(state.st_size, max_size) + 1)
     if len(data) > max_size:
         raise OSError(errno.EFBIG, f"it has more than {max_size} bytes", str(path))
     return data
+
+
+def _check_mode(path: str | Path, mode: int) -> None:
+    """Raise an error if a mode is not that of a regular file."""
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "it is a folder; a file expected", str(path))
+    if not stat.S_ISREG(mode):
+        what = "a link" if stat.S_ISLNK(mode) else "a pipe or a device"
+        raise OSError(errno.EINVAL, f"it is {what}; a regular file expected", str(path))
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Recordings: continuous captures of a hand. Values only, no files and no clock."""
 
 import hashlib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -11,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.blocks import Digests, module_blocks
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.sensors import Sensor
@@ -28,7 +30,7 @@ MAX_SHOWN_CLOCK = 1e5
 """If a recording starts later than this, times are shown since its start [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Label:
     """Contact state over the interval [start, end), with its evidence.
 
@@ -58,7 +60,7 @@ class Label:
     author: str = ""
 
     def __post_init__(self) -> None:
-        if not (np.isfinite([self.start, self.end]).all() and self.start < self.end):
+        if not -math.inf < self.start < self.end < math.inf:
             raise ValueError(f"a label ends after its start; [{self.start}, {self.end}) s given")
         object.__setattr__(self, "state", ContactState(self.state))
         object.__setattr__(self, "cause", None if self.cause is None else Cause(self.cause))
@@ -133,8 +135,9 @@ class Tactile:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
         unit = self.unit or self.sensor.unit
-        if unit != self.sensor.unit:  # calibrated: the range is that of raw readings
-            object.__setattr__(self, "sensor", replace(self.sensor, unit=unit, range=None))
+        if unit != self.sensor.unit:  # calibrated: range, step and rest are those of raw readings
+            raw = replace(self.sensor, unit=unit, range=None, step=None, rests_at_zero=False)
+            object.__setattr__(self, "sensor", raw)
         object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
         if labels:
@@ -209,13 +212,15 @@ class Tactile:
         return replace(part, labels=cut_labels(self.labels, part))
 
 
-def cut_labels(labels: tuple[Label, ...], module: Tactile) -> tuple[Label, ...]:
+def cut_labels(labels: Sequence[Label], module: Tactile) -> tuple[Label, ...]:
     """Return the labels that overlap the samples of a module, cut to them."""
     if module.n_samples == 0:
         return ()
     first, last = float(module.times[0]), float(module.times[-1]) + module.period
     return tuple(
-        replace(label, start=max(label.start, first), end=min(label.end, last))
+        label
+        if first <= label.start and label.end <= last
+        else replace(label, start=max(label.start, first), end=min(label.end, last))
         for label in labels
         if label.start < last and label.end > first
     )
@@ -358,6 +363,16 @@ class Recording:
         """Hash of the readings of all modules, without times and names: copies have the same."""
         parts = sorted(module.readings_digest for module in self.modules.values())
         return hashlib.blake2b("".join(parts).encode(), digest_size=16).hexdigest()
+
+    @cached_property
+    def blocks(self) -> Digests:
+        """Digests of the blocks of all modules, in order of time: parts of it have some of them.
+
+        Times, labels and names of modules do not count ([blocks][holdfast.blocks]).
+        """
+        modules = [module_blocks(module.readings) for module in self.modules.values()]
+        shares = [np.arange(len(blocks)) / max(len(blocks), 1) for blocks in modules]
+        return np.concatenate(modules)[np.argsort(np.concatenate(shares), kind="stable")]
 
     def check_modules_differ(self) -> None:
         """Check that no two modules have the same readings, unless these never change.

@@ -18,7 +18,7 @@ from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import load_objects
 from holdfast.twin.profile import GRASP_ATTEMPTS
 from holdfast.twin.profile import profile as check_profile
-from holdfast.twin.simulation import GRASP_CASES, Grasp
+from holdfast.twin.simulation import GRASP_CASES, USKIN, Grasp
 
 T = TypeVar("T")
 GraspSteps = Callable[[Iterable[T], str, float], Iterable[T]]
@@ -40,11 +40,12 @@ def plan_grasps(
     server: bool = False,
     table: Path | None = None,
     faults: str = "",
+    sensor: str = USKIN,
 ) -> list[Grasp]:
     """Return the grasps of all objects, cases and repeats.
 
     Raises:
-        ValueError: an unknown object, case, profile or fault, or a number out of range.
+        ValueError: an unknown object, case, profile, fault or sensor, or a number out of range.
     """
     names = [name.strip() for name in objects.split(",")] if objects else list(load_objects(table))
     check_profile(profile)
@@ -54,9 +55,13 @@ def plan_grasps(
     chosen = sorted({int(case) for case in cases.split(",")})
     source, troubles = None if table is None else str(table), MagneticFaults.parse(faults)
     grasps = [
-        Grasp(name, case, repeat, profile, seed, server=server, table=source, faults=troubles)
+        Grasp(
+            name, case, repeat, profile, seed,
+            server=server, table=source, faults=troubles, sensor=sensor,
+        )
         for name, case, repeat in product(names, chosen, range(1, repeats + 1))
-    ]
+    ]  # fmt: skip
+    grasps[0].fingertip  # noqa: B018 (raises for an unknown sensor; all have the same)
     for grasp in grasps:
         grasp.item  # noqa: B018 (raises for an unknown object before the simulation starts)
     return grasps
@@ -94,7 +99,7 @@ def simulate_grasps(
         steps: shows the progress; its items are the names of the recordings of each grasp.
 
     Raises:
-        OutputError: an existing recording has another seed or profile.
+        OutputError: an existing recording has another seed, profile or sensor.
     """
     missing = [grasp for grasp in grasps if force or not _is_finished(grasp, out)]
     return simulate_all(
@@ -197,7 +202,8 @@ def _is_finished(grasp: Grasp, out: Path) -> bool:
 def _exists(grasp: Grasp, path: Path) -> bool:
     faults = None if grasp.faults.changes_nothing else asdict(grasp.faults)
     expected = {"profile": grasp.profile, "seed": grasp.seed, "server": grasp.server}
-    return is_recorded(path, expected | {"magnetic_faults": faults})
+    other = None if grasp.sensor == USKIN else grasp.sensor
+    return is_recorded(path, expected | {"magnetic_faults": faults, "sensor": other})
 
 
 def film_all(

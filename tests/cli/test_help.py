@@ -7,6 +7,7 @@ import pytest
 
 from holdfast.cli import app, main
 from holdfast.cli.options import RARE
+from holdfast.io.importers import FORMATS, IMPORTER_PLUGINS, import_hint
 
 ALL_VERBS = [*app.VERBS, *app.SUB_VERBS]
 
@@ -55,3 +56,9 @@ def test_examples_use_only_options_that_the_help_shows(verb, capsys):
         shown = {name for column in columns for name in re.findall(r"--[\w-]+", column)}
         used = {word.partition("=")[0] for word in words if word.startswith("--")}
         assert used <= shown, " ".join(words)
+
+
+@pytest.mark.parametrize("name", [*FORMATS, *IMPORTER_PLUGINS.names()])
+def test_hints_of_import_name_its_options_or_another_verb(name, capsys):
+    for verb, option in re.findall(r"(holdfast [a-z]+ )?(--[\w-]+)", import_hint(name)):
+        assert option in flags(capsys, verb[9:].strip() or "import", "--help-all")

@@ -9,6 +9,7 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import app
+from holdfast.contact import Cause
 from holdfast.io import save_recording
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.recordings import Recording, Tactile
@@ -76,7 +77,9 @@ MESSAGES = [
     (f"play {NO_SERVER} --speed 2", "--speed", NO_SERVER),
     ("play finger.parquet --whole-hand", "--whole-hand", "finger1", "allegro-uskin", "thumb"),
     ("import none out", "none does not exist"),
-    ("import nothing out", "nothing", "--format", "--sensor"),
+    ("import nothing out", "nothing is empty"),
+    ("import nothing out --sensor anyskin", "nothing is empty"),
+    ("import other out", "other", "--format", "--sensor"),
     ("import kept out --format bag", "'bag'", "csv"),
     ("import a.parquet out --suffix bag", "'bag'", "'mcap'"),
     ("import a.parquet kept", "kept", "a folder expected"),
@@ -86,7 +89,8 @@ MESSAGES = [
     ("import a.parquet out --jobs 0", "jobs", "0 given"),
     ("import a.parquet out --engine spark:x", "'spark:x'", "loky", "dask"),
     ("info none", "none does not exist"),
-    ("info nothing", "nothing", "holdfast import"),
+    ("info nothing", "nothing is empty", "holdfast import"),
+    ("info other", "no recording in other (1 other", "holdfast import"),
     ("info data --plot x.svg", "--plot", "data"),
     ("info builtin:any --plot x.svg", "--plot", "builtin:any"),
     ("info a.parquet --plot x.txt", "x.txt", ".png"),
@@ -102,11 +106,14 @@ MESSAGES = [
     ("label auto signal gone", "gone does not exist"),
     ("label auto signal data --tare soon", "tare", "soon"),
     ("label auto signal data --set share", "--set NAME=VALUE", "'share'"),
+    ("label auto signal data --dry-run --set window=1e18", "window", "1e+09", "1e+18"),
+    ("label auto signal data --dry-run --set window=9e8", "window", "the recording", "9e+08"),
     ("label auto signal data --poses p.csv", "--poses", "tracking", "'signal'"),
     ("label auto signal data --video a.mp4", "--video", "tracking", "'signal'"),
     ("label auto tracking data --poses gone.csv", "gone.csv"),
     ("label auto tracking data --poses a.bag", "a.bag", "--track object=NAME"),
     ("label auto tracking data --track object=/pose", "--track", "--poses BAG", "--video FILE"),
+    ("label data --track object=/pose", "--poses BAG", "label auto tracking` has --video"),
     ("label auto tracking data --video a.mp4 --poses p.csv", "--poses and --video"),
     ("label auto tracking data --video a.mp4 --motion a.csv", "--motion", "--video"),
     ("label auto tracking data --column a", "--column", "--motion FILE.csv"),
@@ -124,10 +131,12 @@ MESSAGES = [
     ("teach twin: -o new.json --camera 0", "twin:", "--camera"),
     ("teach twin: -o new.json --to data --unattended", "data", "teach.json"),
     ("teach twin: -o new.json --resume --unattended", "new-grasps", "nothing to resume"),
+    (f"teach {NO_SERVER} -o new.json --camera none.mp4", "none.mp4"),
     (f"teach {NO_SERVER} -o new.json --unattended", "--unattended", "next, repeat, skip"),
     ("train gone -o new.json", "gone"),
     ("train bare -o new.json", "labels"),
     ("train data -o kept.json", "kept.json exists already", "--force"),
+    ("train parts -o new.json", "'a' and 'half'", "remove one", "--split object"),
     ("train data -o new.json --classifier magic", "'magic'", "logreg", "svm"),
     ("train data -o new.json --hold=-1", "hold", "-1"),
     ("train data -o new.json --init builtin:twin --window 14", "--init", "leave out --window"),
@@ -146,6 +155,12 @@ MESSAGES = [
     ("calibrate builtin:any hand -o new.json", "the source hand was removed"),
     ("calibrate builtin:any data -o new.json --seconds 9", "--seconds", "live sources", "data"),
     ("calibrate builtin:any xela://auto -o new.json --seconds 0", "--seconds", "0 s expected"),
+    (
+        "calibrate builtin:any slips -o new.json",
+        "as slip",
+        "at most 1 %",
+        "thumb 5.30 to 6.50 s of a",
+    ),
     ("calibrate builtin:any data -o kept.json", "kept.json exists already", "--force"),
     ("demo new --speed=-1", "--speed", "-1"),
     ("demo new --seed=-1", "--seed", "-1"),
@@ -160,6 +175,8 @@ MESSAGES = [
     ("simulate new --faults field=3,rust=1", "--faults", "'rust=1'", "zero-share"),
     ("simulate new --faults drift", "--faults drift", "a number"),
     ("simulate new --faults drift=-1", "drift", "-1"),
+    ("simulate new --sensor gtac", "'gtac'", "uskin-curved, orca-finger"),
+    ("simulate new --sensor orca-thumb --faults drift=1", "uskin-curved", "orca-thumb"),
     ("simulate kept", "kept"),
     ("export builtin:any model.h --sensor gtac", "--like RECORDING", "--fingers N"),
     ("export builtin:any model.h --like none.parquet", "none.parquet"),
@@ -181,7 +198,7 @@ MESSAGES = [
     ("sensors gtac --template 3x3", "--template", "'gtac'"),
     ("doctor --history x.json", "--history", "SOURCE"),
     ("doctor serial:///dev/null?sensor=part.json", "part.json", "'positions'"),
-    ("doctor touched.parquet --history x.json", "index was touched at 2.1 s"),
+    ("doctor touched.parquet --history x.json", "index is touched from the start"),
 ]
 """Words of a command, and what its message must name: what was wrong, or what to type instead."""
 
@@ -192,15 +209,22 @@ def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("messages")
     whole = synthetic_recording("a", 1, ("thumb", "index"))
     thumb = whole.modules["thumb"]
+    slips = {
+        name: [replace(x, cause=x.cause and Cause.SLIP) for x in module.labels[2:5]]
+        for name, module in whole.modules.items()
+    }
     half = replace(thumb, times=thumb.times[::2], readings=thumb.readings[::2], labels=())
     wide = Tactile(sensor("uskin-4x6"), np.arange(100) / 100, np.zeros((100, 24, 3)))
     touched = 33_000 + np.rint(np.random.default_rng(0).normal(0, 3, (300, 16, 3)))
-    touched[200:, 5, 2] += 500  # one step, louder than any noise
+    touched[:200, 5, 2] += 500  # one step, louder than any noise
     touched = Tactile(sensor("uskin-4x4"), np.arange(300) / 100, touched)
     for name, modules in {
         "a": whole.modules,
         "data/a": whole.modules,
         "data/b": synthetic_recording("b", 2, ("thumb", "index")).modules,
+        "parts/a": whole.modules,
+        "parts/half": {"index": thumb.slice(300, 1400)},
+        "slips/a": whole.with_labels(slips).modules,
         "bare/a": whole.with_labels({}).modules,
         "slow": {"thumb": half},
         "wide": {"thumb": wide},
@@ -216,9 +240,10 @@ def folder(tmp_path_factory):
     (folder / "damaged.parquet").write_bytes(data)
     RecordingWriter(folder / "empty.mcap", {"thumb": sensor("uskin-curved")}).close()
     (folder / "nothing").mkdir()
+    (folder / "other").mkdir()
     for name in ("json", "svg", "pdf", "mcap"):
         (folder / f"kept.{name}").write_text("mine")
-    for name in ("kept", "data/a.csv"):
+    for name in ("kept", "data/a.csv", "other/a.txt"):
         (folder / name).write_text("mine")
     taxels = ",".join(f"F{axis}{taxel}" for taxel in range(9) for axis in "xyz")
     press = "".join(f"{10 * k},{','.join(map(str, range(k, k + 27)))}\n" for k in range(30))

@@ -48,6 +48,11 @@ def test_json_of_a_sensor_is_a_sensor_file(name, capsys, tmp_path):
     assert Sensor.from_dict(printed) == sensor(name)
 
 
+def test_step_and_rest_are_shown_where_they_are_known(capsys):
+    assert re.search(r"step +0\.1 N\nat rest +exactly zero\n", shown(capsys, "orca-finger"))
+    assert "step" not in shown(capsys, "papillarray")
+
+
 def test_json_of_a_hand(capsys):
     printed = json.loads(shown(capsys, "allegro-uskin", "--json"))
     indices = hand("allegro-uskin").modules["index"].flat_indices.tolist()

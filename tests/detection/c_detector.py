@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from holdfast.contact import CAUSES as KNOWN_CAUSES
-from holdfast.contact import ContactState, Reason, faults_of, n_mask_words, taxels_of
+from holdfast.contact import ContactState, Reason, faults_of, taxels_of
 from holdfast.detection import Detector
 from holdfast.detection.c_header import header_of
 from holdfast.detection.plan import Start
 from holdfast.errors import StreamError
+from holdfast.kernel.structs import n_mask_words
 
 WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror")
 STATES, REASONS, CAUSES = tuple(ContactState), tuple(Reason), (None, *KNOWN_CAUSES)

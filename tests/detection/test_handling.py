@@ -20,7 +20,6 @@ from detection.detector.build import (
     z_of,
 )
 from holdfast.detection import ANY_FINGER, Detector, Handling, Model, detect
-from holdfast.detection.model_files import encode
 from holdfast.errors import ModelError
 from holdfast.live.stream_detector import StreamDetector
 from live import build
@@ -160,7 +159,7 @@ def test_two_sensors_of_one_hand():
 
 
 def test_a_model_without_it_says_so():
-    (part,) = msgspec.json.decode(encode(model(finger_model(RICH))))["fingers"].values()
+    (part,) = msgspec.json.decode(model(finger_model(RICH)).encoded())["fingers"].values()
     assert (part["handling"], part["normalised"]) == ({}, False)
 
 

@@ -21,8 +21,6 @@ from detection.detector.build import (
 from holdfast.contact import CAUSES, Cause
 from holdfast.detection import ANY_FINGER, FeatureSpec, FingerModel, Linear, Model
 from holdfast.detection.heads import HEAD_NAMES, Head
-from holdfast.detection.kernel_config import model_config
-from holdfast.detection.model_files import encode
 from holdfast.errors import ModelError
 from holdfast.removed import LAST_COMMIT, REMOVED
 
@@ -74,7 +72,7 @@ def test_fields_that_contradict_each_other_are_refused(head, changes, message):
 
 
 def test_a_head_of_onnx_is_refused_with_what_to_use_instead(tmp_path):
-    fields = json.loads(encode(Model(fingers={ANY_FINGER: finger_model()})))
+    fields = json.loads(Model(fingers={ANY_FINGER: finger_model()}).encoded())
     head = fields["fingers"][ANY_FINGER]["heads"][0]
     head["rule"] = {"type": "onnx", "file": "a.onnx", "sha256": "0" * 64, "n_features": 3}
     path = tmp_path / "model.json"
@@ -148,7 +146,7 @@ def test_the_weights_of_causes_are_those_that_the_head_knows(with_slip):
     part = finger_model(features, 0, cause)
     part = part.with_heads(slip_head(features)) if with_slip else part
     model = Model(fingers={ANY_FINGER: part})
-    _, rules, weights = model_config(model, model.plan({"thumb": sensor()}, 100.0))
+    _, rules, weights = model.config(model.plan({"thumb": sensor()}, 100.0))
     head = rules[0]["heads"][HEAD_NAMES.index("cause")]
     rows = weights[head["first"] :].reshape(-1, 2)
     found = dict(zip(head["causes"], rows.tolist(), strict=False))

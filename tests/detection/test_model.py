@@ -32,7 +32,6 @@ from holdfast.detection import (
     detect,
     parse_features,
 )
-from holdfast.detection.model_files import encode
 from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.errors import ModelError, OutputError
 from holdfast.sensors import sensor as built_in_sensor
@@ -60,6 +59,31 @@ def saved(hand_model, path):
     return path
 
 
+class TestTraining:
+    @pytest.mark.parametrize("n", [1, 10, 1000])
+    def test_blocks_make_a_file_a_fifth_larger_at_most(self, n, tmp_path):
+        recordings = {f"grasp-{k}": f"{k:032x}" for k in range(n)}
+        training = msgspec.structs.replace(TRAINING, recordings=recordings)
+        own = np.random.default_rng(0).integers(2**64, size=(n, 1000), dtype=np.uint64)
+        with_blocks = FULL.with_training(training, list(own))
+        bare = msgspec.structs.replace(FULL, training=training)
+        sizes = [saved(x, tmp_path / f"{x is bare}").stat().st_size for x in (with_blocks, bare)]
+        assert sizes[0] <= 1.2 * sizes[1]
+        assert all(with_blocks.training.has_any(blocks) for blocks in own)
+        assert not bare.training.has_any(own[0])
+
+    def test_without_blocks_a_file_is_as_before(self):
+        assert b"blocks" not in FULL.encoded()
+
+    @pytest.mark.parametrize("blocks", ["AAAA", "AAAAAAA", "A", 5])
+    def test_blocks_are_whole(self, blocks, tmp_path):
+        fields = json.loads(FULL.encoded())
+        fields["training"]["blocks"] = blocks
+        (tmp_path / "m.json").write_text(json.dumps(fields))
+        with pytest.raises(ModelError, match=r"m\.json"):
+            Model.load(tmp_path / "m.json")
+
+
 class TestSaveAndLoad:
     @pytest.mark.parametrize(
         "hand_model", [FULL, Model.load("builtin:noise-floor"), model(), WITH_SQUARES]
@@ -78,8 +102,15 @@ class TestSaveAndLoad:
     def test_a_copy_has_the_same_bytes(self, hand_model, tmp_path):
         """As one that another process returns."""
         copy = pickle.loads(pickle.dumps(hand_model))
-        assert encode(copy) == encode(hand_model)
+        assert copy.encoded() == hand_model.encoded()
         assert copy.digest == Model.load(saved(copy, tmp_path / "m.json")).digest
+
+    def test_step_and_rest_of_a_sensor_are_kept(self, tmp_path):
+        plain = Model(fingers={ANY_FINGER: finger_model()}, sensors={"thumb": sensor()})
+        assert b'"step"' not in plain.encoded()
+        stepped = {"thumb": replace(sensor(), step=0.5, rests_at_zero=True)}
+        loaded = Model.load(saved(msgspec.structs.replace(plain, sensors=stepped), tmp_path / "m"))
+        assert loaded.sensors == stepped
 
     def test_numbers_of_numpy(self, tmp_path):
         rule = Linear((np.float64(1.5),), (2.0,), ((3.0,),), (np.float64(0.25),))
@@ -397,7 +428,7 @@ def test_a_large_file_and_a_pipe_are_refused_at_once(tmp_path):
 
 
 def test_the_ranges_of_an_older_model_are_called_limits(tmp_path):
-    text = encode(Model.load("builtin:twin")).replace(b'"range":[', b'"limits":[')
+    text = Model.load("builtin:twin").encoded().replace(b'"range":[', b'"limits":[')
     assert b'"limits":[' in text
     (tmp_path / "older.json").write_bytes(text)
     older = Model.load(tmp_path / "older.json")

@@ -14,10 +14,12 @@ from holdfast.io import (
     labels_to_csv,
     load_labels,
     load_recording,
+    read_chunks,
     save_labels,
     save_recording,
 )
 from holdfast.recordings import Label
+from traps import traps
 
 MINE = (
     Label(0.5, 1.0, ContactState.UNSTABLE, Cause.SLIP, "video", 0.7, "me"),
@@ -170,6 +172,16 @@ def test_files_that_cannot_be_read(tmp_path, read):
     os.mkfifo(path)
     with pytest.raises(RecordingError, match="a pipe"):
         read(path)
+
+
+@traps
+def test_no_label_file_is_read_but_a_file(saved, word, trap):
+    path = saved[1]
+    labels_path(path).unlink()
+    trap(labels_path(path))
+    for read in (load_recording, lambda path: list(read_chunks(path, 100))):
+        with pytest.raises(RecordingError, match=rf"labels\.json: it is a {word}"):
+            read(path)
 
 
 @pytest.mark.slow

@@ -1,12 +1,15 @@
 """Stickers in videos that a test draws: poses, stamps, and files that are no video."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import foreign, stickers
 from holdfast.io.foreign import read_stickers
-from holdfast.io.stickers import sticker_poses
+from holdfast.io.stickers import picture_stamps, sticker_poses
+from traps import traps
 
 cv2 = pytest.importorskip("cv2")
 
@@ -96,3 +99,23 @@ def test_a_damaged_film_ends(film, tmp_path):
 def test_a_missing_film(tmp_path):
     with pytest.raises(RecordingError, match=r"run\.mp4 does not exist"):
         read_stickers(tmp_path / "run.mp4")
+
+
+@traps
+def test_no_stamps_are_read_but_of_a_file(tmp_path, word, trap):
+    assert picture_stamps(tmp_path / "run.mp4") is None
+    trap(tmp_path / "run.times")
+    with pytest.raises(RecordingError, match=rf"run\.times: it is a {word}"):
+        picture_stamps(tmp_path / "run.mp4")
+
+
+@pytest.mark.parametrize("name", ["run.mp4", "concat:film.mp4"])
+def test_a_text_that_names_a_video_is_none(film, tmp_path, monkeypatch, name):
+    """FFmpeg would open the film that the text, or the name of the file, names."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "film.mp4").write_bytes(film.read_bytes())
+    text = "ffconcat version 1.0\nfile 'film.mp4'\n"
+    for content in (text, "#EXTM3U\n#EXTINF:1,\nfilm.mp4\n", ""):
+        (tmp_path / name).write_text(content)
+        with pytest.raises(RecordingError, match=f"{name} is no video"):
+            read_stickers(Path(name))

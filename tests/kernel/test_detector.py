@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from detection.detector.build import cause_head, lively, model
 from holdfast.contact import Cause
 from holdfast.detection import Detector
-from holdfast.detection.kernel_config import model_config, packed, stream_config
+from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.traces import EstimateTypes
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import struct_type
@@ -37,7 +37,7 @@ def made_kernel(plan, note):
     """A detector of the extension that calls `note` at each change of state."""
     config = *packed(stream_config(plan)), plan.baseline.tobytes()
     types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)}, note)
-    return _extension.Detector(*config, *packed(model_config(with_causes(), plan)), types)
+    return _extension.Detector(*config, *packed(with_causes().config(plan)), types)
 
 
 class TestEstimates:
@@ -120,7 +120,7 @@ class TestDetector:
     def test_rules_that_do_not_fit_are_refused(self, finger, head, field, value, wrong):
         used = with_causes()
         detector = Detector(used)
-        _, rules, weights = model_config(used, detector._plan)
+        _, rules, weights = used.config(detector._plan)
         (rules[finger] if head is None else rules[finger]["heads"][head])[field] = value
         with pytest.raises(ValueError, match=wrong):
             detector._kernel.set_rules(rules.tobytes(), weights.tobytes())
@@ -130,7 +130,7 @@ class TestDetector:
     def test_rules_of_other_fingers_are_refused(self, n_rules):
         used = with_causes()
         detector = Detector(used)
-        _, rules, weights = model_config(used, detector._plan)
+        _, rules, weights = used.config(detector._plan)
         other = np.concatenate([rules, rules])[:n_rules]
         with pytest.raises(ValueError, match="rules: "):
             detector._kernel.set_rules(other.tobytes(), weights.tobytes())

@@ -20,7 +20,7 @@ from detection.detector.build import cause_head, finger_model, speed_head, squar
 from holdfast.contact import Cause
 from holdfast.detection import Debounce, Model
 from holdfast.detection.c_header import Tables, kernel_text
-from holdfast.detection.kernel_config import model_config, packed, stream_config
+from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.specs import RELATIVE_KINDS, FeatureSpec
 from holdfast.detection.traces import EstimateTypes
 from holdfast.kernel import _extension
@@ -118,7 +118,7 @@ def estimates_of(used, plan, rows):
     _extension.Stream(*config).advance(readings, present, times, features, np.empty(present.shape))
     indices = {name: index for index, name in enumerate(plan.fingers)}
     types = EstimateTypes(indices, lambda change: None)
-    kernel = _extension.Detector(*config, *packed(model_config(used, plan)), types)
+    kernel = _extension.Detector(*config, *packed(used.config(plan)), types)
     estimates = np.zeros(present.shape, struct_type("holdfast_finger_estimate"))
     hand = np.empty(len(times))
     kernel.run(readings, present, times, estimates.view(np.float64), hand)

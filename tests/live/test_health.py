@@ -107,6 +107,40 @@ def test_a_source_is_read_for_some_seconds(tmp_path):
     assert found.modules["index"].n_samples == 401
 
 
+def checked(tmp_path, modules, metadata=None):
+    """The check of a recording of modules, by their readings."""
+    recorded = {name: Tactile(PATCH, TIMES, readings) for name, readings in modules.items()}
+    path = tmp_path / "hand.parquet"
+    save_recording(Recording("hand", recorded, metadata=metadata or {}), path, force=True)
+    with open_source(str(path), speed=0) as source:
+        return check_health(source, 10.0)
+
+
+@pytest.mark.parametrize("end", [250, 1000])
+def test_what_precedes_the_first_touch_is_checked(tmp_path, end):
+    """A touch of the pad of `index`, short or to the end, while the field turns later."""
+    pressed = open_hand()
+    pressed[220:end, 5, 2] += 400
+    found = checked(tmp_path, {"thumb": open_hand(1), "index": pressed})
+    assert found.touch == ("index", pytest.approx(2.2, abs=0.2))
+    before = round(100 * (found.touch[1] - 0.2))
+    assert {x.n_samples for x in found.modules.values()} <= {before, before + 1}
+    assert found.modules["index"].highest < 33_100
+    (text,) = changes_since(found, None)
+    assert text.startswith(f"index was touched at {found.touch[1]} s")
+    keep(tmp_path / "kept.json", [], found)
+    assert read_history(tmp_path / "kept.json") == [found]
+
+
+def test_a_hand_that_is_touched_from_the_start_is_told_so(tmp_path):
+    released, early = open_hand(), open_hand()
+    released[:400, 5, 2] += 400
+    early[20:, 5, 2] += 400
+    for readings, metadata in ((released, {}), (early, {}), (open_hand(), {"starts_loaded": True})):
+        with pytest.raises(SourceError, match="is touched from the start: open the hand"):
+            checked(tmp_path, {"index": readings}, metadata)
+
+
 def test_checks_are_kept(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     path = history_path("xela://127.0.0.1:5000")

@@ -1,6 +1,7 @@
 """Panels about slips: what is drawn is what was counted and decided."""
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from msgspec.structs import replace as replace_fields
 from holdfast.detection import Model
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
+from holdfast.metrics.truth_labels import ORIGINS, Onsets
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.slips import draw_slips_found, slip_series
@@ -21,12 +23,12 @@ pytestmark = pytest.mark.slow
 TIMES = 0.01 * np.arange(1000)
 
 
-def decisions(delay, onset=5.0):
+def decisions(delay, onset=5.0, origin="truth"):
     """One slip, found some time after its onset; gross from 0.1 s after it on."""
     codes = np.where((onset <= TIMES) & (onset + 1 > TIMES), SLIDING, STILL).astype(np.int8)
     raised = (onset + delay - 1e-9 <= TIMES) & (onset + 1 > TIMES)
     slip = Slip(onset, onset + 1, onset + 0.1, 2e-3, (onset + 0.2, np.nan))
-    truth = SlipTruth(codes, codes == STILL, (slip,), "truth")
+    truth = SlipTruth(codes, codes == STILL, (slip,), origin)
     slips = SlipDecisions(TIMES, np.where(raised, 0.9, 0.1), raised, 0.0, truth)
     labels = np.where(codes == SLIDING, 2, 3)
     finger = FingerDecisions(TIMES, labels, labels, np.where(labels == 3, 0.9, 0.1), slip=slips)
@@ -46,6 +48,13 @@ def test_the_share_found_over_time():
     times, shares = curves["gross"].get_data()
     assert float(shares[times <= 0][-1]) == 0.5  # 0.04 s after the onset is before the gross slip
     assert axes.get_xlim() == (-0.1, 0.3)
+
+
+@pytest.mark.parametrize("origin", get_args(Onsets))
+def test_slips_of_each_origin_are_drawn(origin):
+    made = [decisions(0.02, origin=origin)]
+    figure = draw_evaluation(summarise(made, n_resamples=10), made)
+    assert figure.axes[-2].get_title("left") == f"slips of fingers: 1 {ORIGINS[origin]}"
 
 
 def test_an_evaluation_has_two_panels_of_slips_only_if_they_are_scored():

@@ -10,6 +10,9 @@ N_TAXELS = {
     "gtac": 15,
     "anyskin": 5,
     "papillarray": 9,
+    "orca-finger": 87,
+    "orca-thumb": 51,
+    "orca-pinky": 51,
 }
 FINGERTIPS = ("thumb", "index", "middle", "ring")
 
@@ -32,7 +35,7 @@ def test_every_sensor(name):
     assert one.positions.shape == (one.n_taxels, 3)
     assert one.rotations.shape == (one.n_taxels, 3, 3)
     assert np.linalg.norm(one.normal) == pytest.approx(1, abs=1e-15)
-    assert one.unit == ("N" if name == "papillarray" else "count")
+    assert one.unit == ("N" if name.startswith(("papillarray", "orca")) else "count")
     assert nearest(one.positions).min() > 1e-3
 
 
@@ -50,6 +53,21 @@ def test_unknown_names():
         sensor("uskin")
     with pytest.raises(ValueError, match="'shadow'"):
         hand("shadow")
+
+
+@pytest.mark.parametrize(
+    ("name", "first"),
+    [
+        ("orca-finger", [0.004036, 0.028082, 0.003726]),
+        ("orca-thumb", [-0.009988, -0.001000, 0.000837]),
+        ("orca-pinky", [-0.007314, -0.001800, 0.000400]),
+    ],
+)
+def test_orca_touch_as_its_driver_has_it(name, first):
+    one = sensor(name)
+    np.testing.assert_array_equal(one.positions[0], first)
+    assert (one.step, one.rests_at_zero) == (0.1, True)
+    np.testing.assert_allclose(one.range, [0.1 * -128, 0.1 * 255])  # int8 and uint8 counts
 
 
 class TestCurvedFingertip:

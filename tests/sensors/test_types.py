@@ -54,6 +54,15 @@ def one_module(indices):
         ({"magnetic": 1}, "pair: magnetic true"),
         ({"range": (1, 0)}, "range of pair"),
         ({"range": (1, 2, 3)}, "range of pair"),
+        ({"step": 0.0}, "pair: a step above 0 expected, 0.0 given"),
+        ({"step": -0.1}, "pair: a step above 0"),
+        ({"step": float("nan")}, "pair: a step above 0"),
+        ({"step": float("inf")}, "pair: a step above 0"),
+        ({"step": True}, "pair: a step above 0"),
+        ({"step": "0.1"}, "pair: a step above 0"),
+        ({"step": 2.0, "range": (0, 1)}, "pair: a step within the range of 0 to 1 expected, 2"),
+        ({"rests_at_zero": 1}, "pair: rests_at_zero true or false expected, 1 given"),
+        ({"rests_at_zero": True, "range": (1, 9)}, "pair: .* has zero in its range, 1 to 9 given"),
     ],
 )
 def test_invalid_fields(fields, message):
@@ -144,6 +153,13 @@ class TestFromJson:
         with pytest.raises(ValueError, match="limits"):
             Sensor.from_json(written(tmp_path, range=[0, 1], limits=[0, 4095]))
 
+    def test_gtac_rests_at_zero_by_its_name(self):
+        gtac = sensor("gtac")
+        assert gtac.rests_at_zero
+        assert "rests_at_zero" not in gtac.to_dict()
+        assert Sensor.from_dict(gtac.to_dict()) == gtac
+        assert not Sensor.from_dict(gtac.to_dict() | {"rests_at_zero": False}).rests_at_zero
+
     def test_what_is_magnetic_is_known_by_the_name_of_a_built_in_sensor(self, tmp_path):
         plain, magnetic = (
             Sensor.from_json(written(tmp_path, magnetic=value)) for value in ("absent", True)
@@ -153,8 +169,17 @@ class TestFromJson:
         assert {name: sensor(name).magnetic for name in built_in_sensors()} == {
             "uskin-curved": True, "uskin-4x4": True, "uskin-4x6": True, "gtac": False,
             "anyskin": True, "papillarray": False,
+            "orca-finger": False, "orca-thumb": False, "orca-pinky": False,
         }  # fmt: skip
         assert all("magnetic" not in sensor(name).to_dict() for name in built_in_sensors())
+
+    def test_step_and_rest_are_written_only_where_they_are_known(self, tmp_path):
+        assert not {"step", "rests_at_zero"} & set(two_taxels().to_dict())
+        plain = Sensor.from_json(written(tmp_path))
+        assert (plain.step, plain.rests_at_zero) == (None, False)
+        stepped = Sensor.from_json(written(tmp_path, step=1, rests_at_zero=True))
+        assert (stepped.step, stepped.rests_at_zero) == (1.0, True)
+        assert Sensor.from_dict(stepped.to_dict()) == stepped
 
     def test_unit_and_range_may_be_left_out(self, tmp_path):
         one = Sensor.from_json(written(tmp_path, unit="absent", range="absent"))
@@ -209,6 +234,8 @@ def test_sensors_are_equal_but_for_the_last_digits():
         {"range": None},
         {"range": (0.0, 4095.0)},
         {"rate": 151.0},
+        {"step": 1.0},
+        {"rests_at_zero": True},
         {"positions": np.zeros((30, 3))},
         {"rotations": np.tile(np.eye(3), (30, 1, 1))},
         {"normal": np.array([0.0, 0.0, 1.0])},

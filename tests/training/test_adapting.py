@@ -8,6 +8,7 @@ import pytest
 from holdfast.detection import ANY_FINGER, Debounce, Tare, parse_features
 from holdfast.errors import ModelError
 from holdfast.training import Setting, evaluate, train
+from holdfast.training.evaluation import was_trained_on
 
 from .build import TINY, tiny_recording
 
@@ -130,6 +131,17 @@ def test_a_model_for_any_sensor_needs_no_warning(known, few):
     part = msgspec.structs.replace(known.fingers[ANY_FINGER], sensor=None)
     init = msgspec.structs.replace(known, fingers={ANY_FINGER: part}, sensors={})
     assert train_with_warnings(few, Setting.adapting(init, trials=0))[1] == []
+
+
+def test_parts_of_the_recordings_of_both_trainings_are_known(known, few):
+    adapted = train(few, replace(FIRST, init=known)).model
+    new, first, second = (
+        replace(recording, modules={k: x.slice(1, 399) for k, x in recording.modules.items()})
+        for recording in (tiny_recording(60), tiny_recording(30), few[1])
+    )
+    assert not was_trained_on(adapted, new)
+    assert was_trained_on(adapted, first)
+    assert was_trained_on(adapted, second)
 
 
 def test_warn_of_recordings_that_the_model_was_trained_on(known, few):

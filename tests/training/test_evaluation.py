@@ -1,6 +1,7 @@
 import weakref
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -8,7 +9,7 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.detection import Model, detect
 from holdfast.errors import ModelError
 from holdfast.metrics import hand_decisions
-from holdfast.recordings import Truth
+from holdfast.recordings import Recording, Truth
 from holdfast.training import Setting, compute_decisions, evaluate, train
 from holdfast.training.evaluation import combine_decisions, evaluate_recordings
 
@@ -105,6 +106,39 @@ def test_each_decision_is_that_of_the_model_of_the_unit(grasps):
             )
     np.testing.assert_array_equal(found.hand.states, hand_decisions(found.fingers, 2).states)
     assert (found.hand.states[:50] == UNKNOWN).all()
+
+
+def parts_of(recording):
+    """Parts of a recording, by what was done to it."""
+    thumb, index = recording.modules.values()
+    cuts = {
+        "first half": (0, 200), "last half": (200, 400), "middle": (90, 290),
+        "without the first": (1, 400), "without the last": (0, 399),
+    }  # fmt: skip
+    return {
+        **{
+            what: {name: each.slice(*cut) for name, each in recording.modules.items()}
+            for what, cut in cuts.items()
+        },
+        "one finger": {"index": index},
+        "renamed": {"thumb": index, "index": thumb},
+        "half of one, renamed": {"thumb": index.slice(0, 200)},
+        "other times": {"index": replace(index, times=index.times + 5, labels=())},
+    }
+
+
+@pytest.mark.parametrize("what", parts_of(tiny_recording(0)))
+def test_a_part_of_the_training_is_no_new_recording(model, grasps, what):
+    part = Recording("part", parts_of(grasps[3])[what])
+    other = Recording("other", parts_of(tiny_recording(40))[what])
+    assert evaluate_recordings(model, [part, other]).trained_on == ["part"]
+
+
+def test_models_of_before_know_whole_recordings(model, grasps):
+    training = msgspec.structs.replace(model.training, blocks=msgspec.UNSET)
+    old = msgspec.structs.replace(model, training=training)
+    half = Recording("half", parts_of(grasps[0])["first half"])
+    assert evaluate_recordings(old, [grasps[0], half]).trained_on == ["grasp-0"]
 
 
 def test_a_model_that_reports_no_slip_is_scored_by_its_ranking():

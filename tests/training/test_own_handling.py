@@ -9,7 +9,7 @@ import pytest
 from detection.detector.build import sensor
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.errors import TrainingError
-from holdfast.recordings import Recording, Tactile
+from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training.own_handling import (
     EDGE_SECONDS,
     MAX_HANDLING,
@@ -131,6 +131,37 @@ def test_clips_of_half_a_second_count():
     clips = [handling_recording(k, held=0.2, open_for=0.15) for k in range(20)]
     handling = handling_of(*clips)
     assert handling.seconds(PAD_KEY) > 20 * 0.15
+
+
+def labelled(cause, *spans):
+    """Handling that is held from 1.3 to 13.3 s by two fingers; one has labels of a cause."""
+    labels = [Label(*span, "UNSTABLE", cause) for span in spans]
+    return handling_recording(0, held=12.0).with_labels({"index": labels})
+
+
+@pytest.mark.parametrize(
+    ("cause", "span"),
+    [
+        ("slip", (5.0, 5.2)),  # 0.2 of 24 s
+        ("slip", (0.0, 0.9)),  # the hand is open
+        ("disturbance", (2.0, 9.0)),
+        (None, (2.0, 9.0)),
+    ],
+)
+def test_labels_of_what_holds_are_handling(cause, span):
+    handling = handling_of(labelled(cause, span))
+    handling.check()
+    plain = handling_of(labelled(cause))
+    np.testing.assert_array_equal(handling.features(PAD_KEY), plain.features(PAD_KEY))
+
+
+def test_labels_of_slip_refuse_it():
+    named = "index 5.00 to 5.20 s of handling-0, index 6.00 to 6.20 s of handling-0"
+    with pytest.raises(TrainingError, match=f"1.6 % .* at most 1 % expected: {named};"):
+        handling_of(labelled("slip", (5.0, 5.2), (6.0, 6.2))).check()
+    many = [(start, start + 0.2) for start in (4.0, 5.0, 6.0, 7.0)]
+    with pytest.raises(TrainingError, match=r"6.00 to 6.20 s of handling-0, \.\.\.;"):
+        handling_of(labelled("slip", *many)).check()
 
 
 def test_sensors_are_kept_apart():

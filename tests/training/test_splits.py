@@ -15,9 +15,10 @@ from holdfast.training.splits import (
 )
 
 
-def entries(*objects):
+def entries(*objects, blocks=()):
+    blocks = np.array([*blocks, *range(len(blocks), len(objects))], np.uint64)
     return [
-        ScannedRecording(f"grasp-{k}", str(k), str(k), thing, 100.0, {})
+        ScannedRecording(f"grasp-{k}", str(k), str(k), thing, 100.0, {}, blocks[k : k + 1])
         for k, thing in enumerate(objects)
     ]
 
@@ -34,6 +35,17 @@ def test_a_unit_of_the_split_by_object_is_all_its_recordings():
     assert data_split.units == ("can", "egg")
     assert [data_split.units_of(index, 1)[0] for index in range(3)] == [0, 1, 0]
     assert data_split.recordings_without({0}) == [1]
+
+
+def test_recordings_that_share_readings_are_held_out_together():
+    shared = entries("can", "egg", "can", blocks=(7, 8, 7))
+    assert split_data(shared, "object", 0).units == ("can", "egg")
+    with pytest.raises(TrainingError, match=r"'grasp-0' and 'grasp-2' .* --split object"):
+        split_data(shared, "recording", 0)
+    with pytest.raises(TrainingError, match="'grasp-0' and 'grasp-1' "):
+        split_data(entries("can", "egg", "can", blocks=(7, 7, 7)), "object", 0)
+    for split in ("time", "random"):  # they part each recording on purpose
+        assert len(split_data(shared, split, 0).units) == 5
 
 
 @given(seed=st.integers(0, 2**32 - 1), index=st.integers(0, 50))

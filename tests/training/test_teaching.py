@@ -33,6 +33,17 @@ def taught(recordings):
     return teach_with_report(BASE, recordings, false_alarms=3.0)
 
 
+def test_a_part_of_another_recording_is_refused(recordings):
+    part = replace(
+        recordings[0],
+        name="part",
+        modules={"index": recordings[0].modules["index"].slice(0, 1000)},
+        truth=None,
+    )
+    with pytest.raises(TrainingError, match="'slips-0' and 'part' share readings"):
+        teach(BASE, [*recordings, part])
+
+
 class TestModel:
     def test_it_finds_slips_of_the_hand_that_the_base_misses(self, taught):
         others = [sliding_recording(seed) for seed in range(20, 24)]

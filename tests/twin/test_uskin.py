@@ -238,7 +238,7 @@ def test_drift_over_50_minutes_is_that_of_the_data_sheet():
     warmths = []
     for seed in range(300):
         run = uskin.readout(np.random.default_rng(seed))
-        counts = run.counts(np.zeros((len(times), 30, 3)), times).astype(float)
+        counts = run.read(np.zeros((len(times), 30, 3)), times).astype(float)
         moved = counts[-1] - counts[0]
         drift = moved[:, 2].mean()
         assert moved[:, 2] == pytest.approx(drift, abs=1.01)
@@ -273,9 +273,7 @@ def test_fed_in_pieces_it_sends_the_same(pieces, seed, parameters):
     whole = tip(parameters, seed=seed).counts(forces, times)
     run = tip(parameters, seed=seed).readout()
     cuts = np.cumsum(pieces)[:-1]
-    parts = [
-        run.counts(*p) for p in zip(np.split(forces, cuts), np.split(times, cuts), strict=True)
-    ]
+    parts = [run.read(*p) for p in zip(np.split(forces, cuts), np.split(times, cuts), strict=True)]
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from holdfast.errors import RecordingError
 from holdfast.files import read_input
+from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.recordings import Recording, Tactile
 from holdfast_pins.skin import pin_skin
 
 SUFFIX = ".pins"
 MAX_FILE_SIZE = 1 << 28
 """A larger file is refused [bytes]: everything that is read is untrusted."""
-HINT = "if the hand already holds the object at the first sample, give --in-contact"
+HINT = IF_IN_CONTACT
 """Is printed after each import."""
 
 

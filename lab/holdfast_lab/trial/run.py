@@ -151,7 +151,7 @@ class RunningTrial:
     def __init__(self, trial: Trial, law: str, model: str) -> None:
         self.trial = trial
         self.simulation = Simulation(trial.grasp, plan=trial.plan(), loads=[trial.load])
-        sensors = {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
+        sensors = {finger: skin.sensor for finger, skin in self.simulation.skins.items()}
         detecting = _model(model)
         self._detector = Detector(detecting, sensors)
         self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS

@@ -72,7 +72,7 @@ SUB_VERBS = {
 HELP = """Detect whether the contact of each fingertip of a robot hand is stable, slipping or
 disturbed, from its tactile sensors, at every sample.
 
-Start with: holdfast demo. It needs no hand and takes a few minutes."""
+Start with: holdfast demo. It needs no hand and takes half a minute."""
 EPILOG = (
     "Each verb has its own help with an example: holdfast VERB --help. With a hand: holdfast "
     "doctor finds it, and holdfast serve builtin:any xela://auto shows it. The tutorials and all "

@@ -61,8 +61,8 @@ def calibrate(
     Write a copy of the model in which every feature is normalised by what it is on this sensor
     while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set
     by the same handling. Begin with an open hand, or give --in-contact. A tenth of the handling
-    may be slip. If the arm hardly moves, or the decisions about this handling get worse, nothing
-    is written without --force.
+    may be slip; where it has labels, a hundredth. If the arm hardly moves, or the decisions about
+    this handling get worse, nothing is written without --force.
 
     DATA are recordings, or a live source such as xela://HOST:PORT or twin:?object=can, which is
     recorded for --seconds and not kept. At least 5 s of holding are needed, 30 s are better.
@@ -99,7 +99,7 @@ def calibrate(
             recorded = record_handling(
                 stream, duration, speed, lambda: stop.requested, print_message
             )
-    recordings = [recorded] if recorded is not None else start.load_dataset(data, labels=False)
+    recordings = [recorded] if recorded is not None else start.load_dataset(data)
     calibrated = calibrate_with_report(
         loaded, recordings, false_alarms=false_alarms, progress=lambda x: progress(x, "reading")
     )

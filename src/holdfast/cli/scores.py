@@ -80,9 +80,8 @@ def print_metrics(metrics: "Metrics") -> None:
     )
     print_paragraph(AUC_NOTE)
     print_line()
-    words = {"mixed": "by truth or labels", "rule": "by labels of a rule, without their margin"}
-    onsets = words.get(hand.onsets, f"by the {hand.onsets}")
-    print_line(f"by event (onset of instability in a held contact, {onsets})")
+    margin = ", without their margin" if hand.onsets == "rule" else ""
+    print_line(f"by event (onset of instability in a held contact, {origin_of(hand)}{margin})")
     missed = ["100.0" if hand.n_events else "-"] * len(hand.missed)
     print_table(
         ("", "events", "missed 0.05 s", "0.1 s", "0.2 s %", "delay s", "p95 s", "alarms/min"),
@@ -147,7 +146,7 @@ def print_slips(
     if not has_rule or summary is None:
         print_line(unscored if has_rule else NO_RULE)
         return
-    print_line(f"slips of fingers ({slips_origin(summary.pooled)})")
+    print_line(f"slips of fingers ({origin_of(summary.pooled)})")
     pooled = summary.pooled
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
     rows.append(_finger_row("all", pooled))
@@ -169,9 +168,11 @@ def print_slips(
         print_paragraph(format_intervals(summary.intervals, chosen=summary.threshold_chosen))
 
 
-def slips_origin(metrics: "SlipMetrics") -> str:
-    """Return where the slips come from."""
-    return {"truth": "by the truth", "mixed": "by truth or labels"}.get(metrics.onsets, "by labels")
+def origin_of(metrics: "EventMetrics | SlipMetrics") -> str:
+    """Return where the onsets come from, in words."""
+    from holdfast.metrics.truth_labels import ORIGINS
+
+    return ORIGINS[metrics.onsets]
 
 
 def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
@@ -232,9 +233,7 @@ def print_points(points: "Sequence[CurvePoint]", notes: dict[float, str]) -> Non
     # The points are of one question: all have the scores of slips, or none has.
     slips = {point.threshold: point.slips for point in points if point.slips is not None}
     if slips:
-        print_line(
-            f"slips of fingers at each threshold ({slips_origin(next(iter(slips.values())))})"
-        )
+        print_line(f"slips of fingers at each threshold ({origin_of(next(iter(slips.values())))})")
         print_table(
             ("threshold", *SHARES_HEADER, ""),
             [(f"{t:.4g}", *share_cells(x), notes.get(t, "")) for t, x in slips.items()],

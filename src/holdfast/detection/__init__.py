@@ -7,14 +7,20 @@ from holdfast.detection.features import (
     fingertip_force,
     haar_features,
 )
-from holdfast.detection.heads import Choice, Head, HeadName, Linear, ThresholdPoint
+from holdfast.detection.heads import (
+    Choice,
+    Debounce,
+    FingerModel,
+    Handling,
+    Head,
+    HeadName,
+    Linear,
+    ThresholdPoint,
+)
 from holdfast.detection.model import (
     ANY_FINGER,
     EXACT_RATE,
     RELATIVE_RATES,
-    Debounce,
-    FingerModel,
-    Handling,
     Model,
     Training,
 )

@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.contact import Fault, Reason, n_mask_words
-from holdfast.detection.kernel_config import model_config, stream_config
+from holdfast.contact import Fault, Reason
+from holdfast.detection.kernel_config import stream_config
 from holdfast.detection.model import Model
 from holdfast.detection.plan import OPEN_HAND, Start, StreamPlan
 from holdfast.errors import ModelError
-from holdfast.kernel.structs import fields_of, types_of
+from holdfast.kernel.structs import fields_of, n_mask_words, types_of
 from holdfast.sensors import Sensor
 
 LINE = 100
@@ -56,7 +56,7 @@ class Tables:
     def __init__(self, kernel: str, model: Model, plan: StreamPlan, *, single: bool) -> None:
         self.fields, self.texts, self.n_bytes = fields_of(kernel), list[str](), 0
         self._single = single
-        stream, detector, baseline = stream_config(plan), model_config(model, plan), plan.baseline
+        stream, detector, baseline = stream_config(plan), model.config(plan), plan.baseline
         names = stream.hand.dtype.names or ()
         self.sizes = {name: int(stream.hand[name][0]) for name in names if name.startswith("n_")}
         self.sizes["n_taxels"] = len(baseline)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from numpy import ndarray
 
 from holdfast.contact import ContactEvent, HandEstimate
-from holdfast.detection.kernel_config import model_config, packed, stream_config, with_thresholds
+from holdfast.detection.kernel_config import packed, stream_config, with_thresholds
 from holdfast.detection.model import Model
 from holdfast.detection.plan import Start, StreamPlan, declared_baselines
 from holdfast.detection.traces import STATE_BY_CODE, Chunk, Detection, EstimateTypes, detection_of
@@ -93,7 +93,7 @@ class Detector:
         self._names = (*plan.fingers, HAND)
         # Only `set_thresholds` replaces the rules. `_readings` and `_present` are memory for
         # samples of other types.
-        self._settings, self._rules, self._weights = model_config(model, self._plan)
+        self._settings, self._rules, self._weights = model.config(self._plan)
         self._readings = np.zeros_like(self._plan.baseline)
         self._present = np.zeros(len(plan.fingers), dtype=np.bool_)
         self._begin()

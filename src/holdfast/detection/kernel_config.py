@@ -1,22 +1,18 @@
 """Constants of the C kernel as arrays of its structs: those of a plan, and those of a model."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from holdfast.contact import CAUSES, SLIP_CODE
-from holdfast.detection.heads import HEAD_NAMES, Head
+from holdfast.detection.heads import HEAD_NAMES, Debounce, FingerModel, Head
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import Structs, structs
-from holdfast.resampling import skips_zeros
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
-
-if TYPE_CHECKING:
-    from holdfast.detection.model import FingerModel, Model
 
 Row = dict[str, Any]
 """Values of a struct, by the names of its fields in `kernel/holdfast.h`."""
@@ -179,7 +175,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
         "is_magnetic": bool(sensor.magnetic),
-        "rests_at_zero": not skips_zeros(sensor),
+        "rests_at_zero": bool(sensor.rests_at_zero),
         # The load of the start, when it goes, may look like a field.
         "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
         if sensor.magnetic and not plan.zero_unknown
@@ -241,9 +237,17 @@ def _in_lanes(values: Array, n_lanes: int) -> Array:
     return np.pad(own, ((0, 0), (0, n_lanes - own.shape[1]))).ravel()
 
 
-def model_config(model: "Model", plan: StreamPlan) -> ModelConfig:
-    """Return the constants of a model: its settings for all fingers, and the rules of a plan's."""
-    parts = [model.finger(name, sensor) for name, sensor in plan.sensors.items()]
+def model_config(
+    parts: Sequence[FingerModel], debounce: Debounce, n_model_fingers: int, plan: StreamPlan
+) -> ModelConfig:
+    """Return the constants of a model.
+
+    Args:
+        parts: model of each finger of the plan.
+        debounce: of the model.
+        n_model_fingers: number of fingers on which the state of the hand depends.
+        plan: of the stream.
+    """
     heads: list[Row] = []
     numbers = [np.empty(0)]
     for part in parts:
@@ -265,10 +269,10 @@ def model_config(model: "Model", plan: StreamPlan) -> ModelConfig:
                 }
             )
             numbers += [rows.ravel(), squares.ravel()]
-    weights, debounce = np.concatenate(numbers), model.debounce
+    weights = np.concatenate(numbers)
     settings = {
         "n_weights": len(weights),
-        "n_model_fingers": model.n_fingers(plan.fingers),
+        "n_model_fingers": n_model_fingers,
         "hysteresis": debounce.hysteresis,
         "min_duration": debounce.min_duration,
         "hold": debounce.hold,
@@ -291,7 +295,7 @@ def with_thresholds(rules: Structs, thresholds: Mapping[int, float]) -> Structs:
     return changed
 
 
-def _contact(part: "FingerModel") -> Row:
+def _contact(part: FingerModel) -> Row:
     # In this order: a model of relative features has a limit by load; and a limit in the unit of
     # the readings, which was measured, is better than a multiple of the noise.
     for kind, limit in (
@@ -304,7 +308,7 @@ def _contact(part: "FingerModel") -> Row:
     return {"contact": _extension.ALWAYS_CONTACT, "contact_limit": 0.0}
 
 
-def _numbers(part: "FingerModel", head: Head | None) -> tuple[Array, Array, list[int]]:
+def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[int]]:
     """Return the weights (n_outputs, 1 + n) of the first n features, those of squares, and causes.
 
     A slip is no likely cause where a head decides about slips.

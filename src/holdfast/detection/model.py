@@ -1,7 +1,7 @@
 """The model of a hand: features, classifiers and decision rule."""
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
 from importlib import resources
@@ -12,252 +12,29 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.blocks import MAX_PACKED, PACKED_BYTES, Digests, any_packed, pack
 from holdfast.contact import MAX_TAXELS
 from holdfast.detection.features import extract
-from holdfast.detection.heads import HEAD_NAMES, Choice, Head, HeadName, Linear
-from holdfast.detection.model_files import decode, encode, read_model, write_model
+from holdfast.detection.heads import (
+    MAX_FINGERS,
+    MAX_WINDOW,
+    Choice,
+    Debounce,
+    FingerModel,
+    Head,
+    HeadName,
+    Linear,
+    check_limit,
+)
+from holdfast.detection.kernel_config import ModelConfig, model_config
+from holdfast.detection.model_files import decode, encode, file_text, read_model, write_model
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import DEFAULT_WINDOW, FeatureSpec
 from holdfast.errors import ModelError
 from holdfast.recordings import Recording
 from holdfast.resampling import RATE_TOLERANCE
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE, Array, Integers
-
-MAX_WINDOW = 1 << 16
-"""Maximum length of a window [samples]."""
-MAX_FEATURES = 1024
-"""Maximum number of features of a finger."""
-MAX_FINGERS = 256
-"""Maximum number of fingers, and of sensors, in a model."""
-
-
-class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Own handling: what the features of a sensor are while its user holds objects, without slip.
-
-    Attributes:
-        location: of each feature of `FingerModel.features`.
-        scale: of each of them, above 0.
-        seconds: held time of one finger on which it rests [s].
-        thresholds: by the name of the head; other heads keep that of the model.
-        recordings: content digest of each recording, by name.
-
-    Raises:
-        ModelError: lengths differ, a number is not finite, a scale or the time is not above 0, or
-            a threshold is not from 0 to 1.
-    """
-
-    location: tuple[float, ...]
-    scale: tuple[float, ...]
-    seconds: float
-    thresholds: dict[HeadName, float] = {}
-    recordings: dict[str, str] = {}
-
-    def __post_init__(self) -> None:
-        if len(self.location) != len(self.scale):
-            raise ModelError(
-                f"{len(self.location)} locations and {len(self.scale)} scales of own handling "
-                "given; the same number of both expected"
-            )
-        # Finite first: a comparison with NaN is False, so that the next check would pass it.
-        if not all(math.isfinite(x) for x in (*self.location, *self.scale, self.seconds)):
-            raise ModelError("a number of the own handling is not finite")
-        if min((*self.scale, self.seconds)) <= 0:
-            raise ModelError("scales and held time above 0 expected for own handling")
-        for threshold in self.thresholds.values():
-            if not 0 <= threshold <= 1:
-                raise ModelError(f"a threshold from 0 to 1 expected, {threshold} given")
-
-
-class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Model of one finger: its heads, its rule of contact, and own handling.
-
-    Attributes:
-        heads: at most one of each name; `stable` is required, and `slip` for `slip_speed`.
-        sensor: name of the sensor of the training; None for any sensor.
-        contact_threshold: F_a below it is no contact [unit of the readings]; None for none.
-        contact_noise: the same as a multiple of the noise during the tare, used if
-            `contact_threshold` is None.
-        contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
-            for relative features; used instead of the others if it is given.
-        normalised: `stable` and `slip` work on features that are normalised by own handling. Their
-            means and scales are then those of default handling; `for_sensor` replaces them.
-        handling: own handling by the name of the sensor, of a model that is normalised.
-
-    Raises:
-        ModelError: the fields contradict each other.
-    """
-
-    heads: tuple[Head, ...]
-    sensor: str | None = None
-    contact_threshold: float | None = None
-    contact_noise: float | None = None
-    contact_load: float | None = None
-    normalised: bool = False
-    handling: dict[str, Handling] = {}
-
-    def __post_init__(self) -> None:
-        names = [head.name for head in self.heads]
-        if len(set(names)) < len(names):
-            raise ModelError(f"one head of each name expected, {', '.join(names)} given")
-        if "stable" not in names or ("slip_speed" in names and "slip" not in names):
-            raise ModelError(
-                f"a head stable, and slip for slip_speed, expected; {', '.join(names)} given"
-            )
-        features = self.features
-        check_limit("features of a finger", len(features), MAX_FEATURES)
-        check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
-        # The load is that of relative features, which the six of the paper do not have.
-        if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
-            raise ModelError("contact_load given; it needs at least one relative feature")
-        for value in (self.contact_threshold, self.contact_noise, self.contact_load):
-            if value is not None and not (math.isfinite(value) and value >= 0):
-                raise ModelError(f"a contact threshold of at least 0 expected, {value} given")
-        self._check_handling()
-
-    def _check_handling(self) -> None:
-        if self.handling and not self.normalised:
-            raise ModelError("own handling given; it needs a model with normalised features")
-        check_limit("sensors with own handling", len(self.handling), MAX_FINGERS)
-        n_features = len(self.features)
-        for name, handling in self.handling.items():
-            if len(handling.location) != n_features:
-                raise ModelError(
-                    f"own handling of {len(handling.location)} features given for {name!r}, "
-                    f"{n_features} expected"
-                )
-            for head in handling.thresholds:
-                if self.head(head) is None:
-                    raise ModelError(f"a threshold of {head} given for {name!r}; no such head")
-
-    def head(self, name: HeadName) -> Head | None:
-        """Return the head with a name; None if there is none."""
-        return next((head for head in self.heads if head.name == name), None)
-
-    @property
-    def stable(self) -> Head:
-        """The head of stability."""
-        return next(head for head in self.heads if head.name == "stable")
-
-    @property
-    def slip(self) -> Head | None:
-        """The head that decides whether the finger slides; None if there is none."""
-        return self.head("slip")
-
-    @property
-    def features(self) -> tuple[FeatureSpec, ...]:
-        """Features of all heads: those of `stable` in their order, then others of the rest."""
-        # By the name of the head: a model file may list them in any order.
-        ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
-        return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
-
-    def indices(self, head: Head) -> Integers:
-        """Return the indices of the features of a head in those of the finger."""
-        features = self.features
-        return np.array([features.index(spec) for spec in head.features], dtype=np.int64)
-
-    def with_heads(self, *heads: Head) -> "FingerModel":
-        """Return the model with some heads in place of those of the same names, or beside them."""
-        by_name = {head.name: head for head in (*self.heads, *heads)}
-        return msgspec.structs.replace(self, heads=tuple(by_name.values()))
-
-    def without_heads(self, *names: HeadName) -> "FingerModel":
-        """Return the model without some heads."""
-        heads = tuple(head for head in self.heads if head.name not in names)
-        return msgspec.structs.replace(self, heads=heads)
-
-    @property
-    def default_handling(self) -> tuple[Array, Array]:
-        """Location and scale of `features` without own handling: those of `stable`, else `slip`."""
-        location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
-        # `stable` last: where both use a feature, its moments count.
-        for head in (self.slip, self.stable):
-            if head is not None:
-                location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
-        return location, scale
-
-    def for_sensor(self, sensor_name: str) -> "FingerModel":
-        """Return the model with the own handling of a sensor, if it has any, in its heads."""
-        handling = self.handling.get(sensor_name)
-        return self if handling is None else self.with_handling(handling)
-
-    def with_handling(self, handling: Handling) -> "FingerModel":
-        """Return the model with own handling in its heads.
-
-        With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
-        (phi_j - mean_j) / scale_j in `stable` and `slip`. Means and scales of the other heads are
-        of unstable or sliding samples, so they move as the default handling does.
-        """
-        before = self.default_handling
-        after = np.array(handling.location), np.array(handling.scale)
-        heads = []
-        for head in self.heads:
-            columns = self.indices(head)
-            location, scale = after[0][columns], after[1][columns]
-            if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
-                mean, own_scale = head.rule.moments
-                ratio = scale / before[1][columns]
-                location = location + ratio * (mean - before[0][columns])
-                scale = ratio * own_scale
-            threshold = handling.thresholds.get(head.name, head.threshold)
-            heads.append(head.normalised_by(location, scale).at(threshold, head.choice))
-        return msgspec.structs.replace(self, heads=tuple(heads), handling={})
-
-    def without_thresholds(self, name: HeadName) -> "FingerModel":
-        """Return the model whose own handling does not set the threshold of a head."""
-        replace = msgspec.structs.replace
-        handling = {
-            sensor: replace(own, thresholds={k: t for k, t in own.thresholds.items() if k != name})
-            for sensor, own in self.handling.items()
-        }
-        return replace(self, handling=handling)
-
-
-class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Debouncing of state changes. By default, and for the paper's figures, there is none.
-
-    Attributes:
-        min_duration: time that a new state must last before it is reported [s].
-        hysteresis: distance past its threshold that a probability needs to change the state.
-        hold: time for which UNSTABLE is still reported after the last unstable sample, while
-            the finger is in contact, so that one disturbance is one alarm [s].
-        switching: of the forward filter of the probability: how often a contact turns from stable
-            to unstable, or back [1/s]; 0 or unset for no filter. 15.3 is a probability of 0.8 to
-            stay as it is for 1/60 s.
-
-    Raises:
-        ModelError: a value is out of range.
-
-    Example:
-        >>> round(Debounce(switching=15.3).stay(1 / 60), 2)
-        0.8
-    """
-
-    min_duration: float = 0.0
-    hysteresis: float = 0.0
-    hold: float = 0.0
-    # Unset, not 0: models without a filter keep the digest that they had before there was one.
-    switching: float | msgspec.UnsetType = msgspec.UNSET
-
-    def __post_init__(self) -> None:
-        # Finite and not below 0: NaN passes no comparison.
-        rate = self.switching_rate
-        if not (math.isfinite(rate) and rate >= 0):
-            raise ModelError(f"a switching of at least 0 per second expected, {rate} given")
-        for seconds in (self.min_duration, self.hold):
-            if not (math.isfinite(seconds) and seconds >= 0):
-                raise ModelError(f"a duration of at least 0 s expected, {seconds} given")
-        if not 0 <= self.hysteresis < 1:
-            raise ModelError(f"a hysteresis from 0 to 1 expected, {self.hysteresis} given")
-
-    @property
-    def switching_rate(self) -> float:
-        """The rate of switching [1/s]; 0 if there is no filter."""
-        return 0.0 if self.switching is msgspec.UNSET else float(self.switching)
-
-    def stay(self, seconds: float) -> float:
-        """Return the probability that a contact is in the same state after some time [s]."""
-        return 0.5 * (1.0 + math.exp(-2.0 * self.switching_rate * seconds))
+from holdfast.sensors.types import MAX_RATE, ROTATION_TOLERANCE
 
 
 class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -273,6 +50,10 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         samples: number of used and of all labelled samples of each finger of which only every
             n-th was used.
         sliding_samples: number of sliding samples that each slip rule was trained on.
+        blocks: shortened digests of blocks of the recordings, by which parts of them are found.
+
+    Raises:
+        ModelError: the blocks are not whole.
     """
 
     recordings: dict[str, str]
@@ -283,16 +64,18 @@ class Training(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     versions: dict[str, str] = {}
     samples: dict[str, tuple[int, int]] | msgspec.UnsetType = msgspec.UNSET
     sliding_samples: dict[str, int] | msgspec.UnsetType = msgspec.UNSET
+    # Unset in models that were trained before there were blocks.
+    blocks: bytes | msgspec.UnsetType = msgspec.UNSET
 
+    def __post_init__(self) -> None:
+        if self.blocks is not msgspec.UNSET and len(self.blocks) % PACKED_BYTES:
+            raise ModelError(
+                f"blocks of {PACKED_BYTES} bytes each expected, {len(self.blocks)} bytes given"
+            )
 
-def check_limit(what: str, given: float, most: float) -> None:
-    """Refuse a number of things above a limit.
-
-    Raises:
-        ModelError: it is above the limit.
-    """
-    if given > most:
-        raise ModelError(f"at most {most:.7g} {what} expected, {given} given")
+    def has_any(self, blocks: Digests) -> bool:
+        """Return whether one of some blocks is of a training recording, as far as is known."""
+        return self.blocks is not msgspec.UNSET and any_packed(self.blocks, blocks)
 
 
 ANY_FINGER = "*"
@@ -301,6 +84,9 @@ EXACT_RATE = 0.05
 """Tolerance of a measured rate beside a nominal one, as a share of it."""
 RELATIVE_RATES = (30.0, 1000.0)
 """Rates for which relative features are made [Hz]."""
+MAX_PACKED_SHARE = 0.147
+"""Most bytes of packed blocks, as a share of the file of the model. In Base64 they are a third
+longer: 19.6 %."""
 
 
 class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -380,12 +166,16 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Raises:
             OutputError: the file exists and `force` is not given, or it cannot be written.
         """
-        write_model(path, self, force=force)
+        write_model(path, self.encoded(), force=force)
+
+    def encoded(self) -> bytes:
+        """Return the JSON of the model."""
+        return encode(self, self.sensors)
 
     @property
     def digest(self) -> str:
         """Digest of the content, for results that depend on the model."""
-        return sha256(encode(self)).hexdigest()
+        return sha256(self.encoded()).hexdigest()
 
     @property
     def has_slip_rule(self) -> bool:
@@ -407,6 +197,21 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
             "teach): slip_probability is a ranking, and UNSTABLE the sign to grip harder in advance"
         )
+
+    def with_training(self, training: Training, blocks: Sequence[Digests]) -> Self:
+        """Return the model with its provenance, and as many blocks as make it 20 % larger at most.
+
+        Args:
+            training: provenance; its blocks, of a model that was adapted, are kept.
+            blocks: of each training recording.
+        """
+        replace = msgspec.structs.replace
+        before = b"" if training.blocks is msgspec.UNSET else training.blocks
+        model = replace(self, training=replace(training, blocks=msgspec.UNSET))
+        n_bytes = MAX_PACKED_SHARE * len(file_text(model.encoded())) - len(before)
+        n_each = int(min(max(n_bytes / PACKED_BYTES / len(blocks), 1), MAX_PACKED))
+        packed = before + pack(blocks, n_each)
+        return replace(model, training=replace(training, blocks=packed or msgspec.UNSET))
 
     def changed(self, change: Callable[[FingerModel], FingerModel]) -> Self:
         """Return the model with each of its fingers changed by a function."""
@@ -567,6 +372,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             tare=Tare.parse(self.tare),
             rate=rate,
         )
+
+    def config(self, plan: StreamPlan) -> ModelConfig:
+        """Return the constants of the C kernel for the fingers of a plan."""
+        parts = [self.finger(*finger) for finger in plan.sensors.items()]
+        return model_config(parts, self.debounce, self.n_fingers(plan.fingers), plan)
 
     def blind_features(self, finger: str, sensor: Sensor) -> tuple[str, ...]:
         """Return the kinds of features of a finger that need more taxels than a sensor has."""

@@ -1,23 +1,20 @@
 """Model files of JSON."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
 
-from holdfast.detection.heads import Head
 from holdfast.errors import ModelError, OutputError
 from holdfast.files import check_keys, read_input, write_whole
 from holdfast.removed import removal
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import with_range
 
-if TYPE_CHECKING:
-    from holdfast.detection.model import Model
-
-ModelT = TypeVar("ModelT", bound="Model")
+ModelT = TypeVar("ModelT", bound=msgspec.Struct)
 
 MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
@@ -54,73 +51,27 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
 
 
-def facts_of(model: "Model") -> dict[str, Any]:
-    """Return what a model is for, how it decides and what it was made from, as JSON has it.
-
-    Means, scales and weights, and the location and scale of own handling, are in the file only.
-    """
-    fingers = {}
-    for name, part in model.fingers.items():
-        sensor = None if part.sensor is None else model.sensors[part.sensor]
-        fingers[name] = {
-            "sensor": part.sensor,
-            "unit": None if sensor is None else sensor.unit,
-            "heads": {head.name: _facts_of_head(head) for head in part.heads},
-            "contact_threshold": part.contact_threshold,
-            "contact_noise": part.contact_noise,
-            "contact_load": part.contact_load,
-            "normalised": part.normalised,
-            "handling": {
-                sensor_name: {
-                    "seconds": handling.seconds,
-                    "thresholds": handling.thresholds,
-                    "recordings": list(handling.recordings),
-                }
-                for sensor_name, handling in part.handling.items()
-            },
-        }
-    training = None
-    if model.training is not None:
-        training = msgspec.to_builtins(model.training)
-        training["recordings"] = list(model.training.recordings)
-    return {
-        "name": model.name,
-        "rate": model.rate,
-        "tare": model.tare,
-        "debounce": msgspec.to_builtins(model.debounce),
-        "fingers": fingers,
-        "training": training,
-    }
-
-
-def _facts_of_head(head: Head) -> dict[str, Any]:
-    fields: dict[str, Any] = msgspec.to_builtins(head)
-    rule, n = fields.pop("rule"), head.rule.n_features
-    fields["rule"] = f"{rule['type']}, {n} feature{'s' * (n > 1)}"
-    fields["features"] = [str(spec) for spec in head.features]
-    if head.choice is not None:
-        fields["choice"] |= {"recordings": list(head.choice.recordings)}
-    if head.link != "logit":
-        del fields["threshold"]
-    return fields
-
-
-def write_model(path: str | Path, model: "Model", *, force: bool) -> None:
-    """Write a model.
+def write_model(path: str | Path, data: bytes, *, force: bool) -> None:
+    """Write the JSON of a model.
 
     Raises:
         OutputError: the file exists and `force` is not given, or it cannot be written.
     """
     if str(path).startswith("builtin:"):
         raise OutputError(f"{path} is the name of a built-in model; a file expected")
-    write_whole(path, msgspec.json.format(encode(model), indent=1) + b"\n", force=force)
+    write_whole(path, file_text(data), force=force)
 
 
-def encode(model: "Model") -> bytes:
-    """Return the JSON of a model."""
+def file_text(data: bytes) -> bytes:
+    """Return the text of a model file."""
+    return msgspec.json.format(data, indent=1) + b"\n"
+
+
+def encode(model: msgspec.Struct, sensors: Mapping[str, Sensor]) -> bytes:
+    """Return the JSON of a model and its sensors."""
     fields = msgspec.to_builtins(model, enc_hook=_encode_array)
-    sensors = {name: sensor.to_dict() for name, sensor in model.sensors.items()}
-    return msgspec.json.encode(fields | {"sensors": sensors})
+    documents = {name: sensor.to_dict() for name, sensor in sensors.items()}
+    return msgspec.json.encode(fields | {"sensors": documents})
 
 
 def decode(data: bytes, kind: type[ModelT]) -> ModelT:

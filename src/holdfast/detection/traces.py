@@ -19,12 +19,11 @@ from holdfast.contact import (
     HandEstimate,
     Reason,
     faults_of,
-    n_mask_words,
     taxels_of,
 )
 from holdfast.errors import require_extras
 from holdfast.kernel import _extension
-from holdfast.kernel.structs import Structs, struct_type
+from holdfast.kernel.structs import Structs, n_mask_words, struct_type
 from holdfast.recordings import Recording
 from holdfast.sensors import taxel_numbers
 from holdfast.sensors.types import Array, Flags

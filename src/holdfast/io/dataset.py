@@ -79,9 +79,13 @@ def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = 
         deeper = (p.parent for p in sorted(path.glob("[!.]*/*")) if is_recording(p))
         found = next(deeper, None)
         advice = f"{found} has some" if found else "`holdfast import` makes them"
+        what = (
+            f"no recording in {path} ({n_entries} other entries)"
+            if n_entries
+            else f"{path} is empty"
+        )
         raise RecordingError(
-            f"no recording in {path} ({n_entries} other entries); files "
-            f"{' or '.join('*' + suffix for suffix in SUFFIXES)} expected: {advice}"
+            f"{what}; files {' or '.join('*' + suffix for suffix in SUFFIXES)} expected: {advice}"
         )
     paths = [by_name[name] for name in sorted(by_name)]
     return Dataset(paths, labels=labels, in_contact=in_contact)

@@ -9,7 +9,7 @@ import msgspec
 import numpy as np
 
 from holdfast.errors import OutputError, RecordingError, require_extras
-from holdfast.io.label_files import labels_for, labels_path
+from holdfast.io.label_files import decode_labels, label_bytes, labels_for, labels_of, labels_path
 from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import (
     TACTILE,
@@ -156,11 +156,12 @@ def _chunks(
     with recording_errors(path):
         header, groups, complete = file_format.read_groups(path)
         file_labels = None
-        if labels and labels_path(path).exists():
+        if labels and (data := label_bytes(path)) is not None:
             # A label file names its recording by the digest. A cut file, or one recorded live, has
             # none in its header, and is loaded to compute it.
             digest = header.digest if complete else ""
-            file_labels = labels_for(path, digest or file_format.load(path).digest)
+            digest = digest or file_format.load(path).digest
+            file_labels = labels_of(decode_labels(data, labels_path(path)), path, digest)
         # A marker may be set for an earlier time than the one before.
         markers = sorted(header.markers)
         for arrays, end in _chunk_arrays(groups, n_samples):

@@ -44,6 +44,10 @@ class LabelData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     author: str = ""
 
 
+_STATE_NAMES: Mapping[ContactState, Any] = {x: x.value.lower() for x in ContactState}
+"""One text for all labels of a state."""
+
+
 class ModuleData(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A module in a file; `number` and `n_samples` are None while recording."""
 
@@ -187,8 +191,10 @@ def header_sensors(header: Header) -> dict[str, Sensor]:
 
 def label_data(label: Label) -> LabelData:
     """Convert a label to its form in a file."""
-    numbers = {name: float(getattr(label, name)) for name in ("start", "end", "confidence")}
-    return LabelData(**{**vars(label), **numbers, "state": label.state.value.lower()})
+    return LabelData(
+        float(label.start), float(label.end), _STATE_NAMES[label.state], label.cause,
+        label.evidence, float(label.confidence), label.author,
+    )  # fmt: skip
 
 
 def label_of(data: LabelData) -> Label:
@@ -197,7 +203,7 @@ def label_of(data: LabelData) -> Label:
     Raises:
         ValueError: its interval or its confidence is not valid.
     """
-    return Label(**{**msgspec.structs.asdict(data), "state": ContactState(data.state.upper())})
+    return Label(**{**msgspec.structs.asdict(data), "state": data.state.upper()})
 
 
 def number_type(array: npt.NDArray[Any], name: str) -> NumberType:

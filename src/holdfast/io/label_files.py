@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from hashlib import blake2b
 from io import StringIO
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeVar
 
 import msgspec
 
@@ -22,13 +22,27 @@ MAX_LABEL_FILE_SIZE = 1 << 28
 CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
 
 
-class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """Content of a label file.
+class LabelOwner(msgspec.Struct, frozen=True, kw_only=True):
+    """Which recording a label file belongs to.
 
     Attributes:
         schema: kind and version of the file.
         recording: `Recording.digest` of the labelled recording.
         name: name of that recording.
+    """
+
+    schema: Literal["holdfast.labels/1"] = "holdfast.labels/1"
+    recording: str
+    name: str
+
+
+T = TypeVar("T", bound=LabelOwner)
+
+
+class LabelFile(LabelOwner, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Content of a label file.
+
+    Attributes:
         modules: labels by module; a module that is missing has none.
         author: person or program that made the labels.
         time: time of labelling, as ISO 8601 text; empty if unknown.
@@ -36,9 +50,6 @@ class LabelFile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
         digest: hash of all other fields; empty in a file that a person wrote.
     """
 
-    schema: Literal["holdfast.labels/1"] = "holdfast.labels/1"
-    recording: str
-    name: str
     modules: dict[str, list[LabelData]]
     author: str = ""
     time: str = ""
@@ -111,11 +122,44 @@ def load_labels(path: str | Path) -> LabelFile:
         RecordingError: it cannot be read, is not a label file, or does not match its digest.
     """
     try:
-        file = msgspec.json.decode(read_input(path, MAX_LABEL_FILE_SIZE), type=LabelFile)
+        return decode_labels(read_input(path, MAX_LABEL_FILE_SIZE), path)
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+
+
+def label_bytes(path: Path) -> bytes | None:
+    """Return the content of the label file of the recording at `path`; None without one.
+
+    Raises:
+        RecordingError: it cannot be read, or is a link.
+    """
+    try:
+        return read_input(labels_path(path), MAX_LABEL_FILE_SIZE, follow=False)
+    except FileNotFoundError:
+        return None
+    except OSError as cause:
+        raise RecordingError(f"cannot read {labels_path(path)}: {cause.strerror}") from cause
+
+
+def decode_file(data: bytes, path: str | Path, kind: type[T]) -> T:
+    """Decode the content of the label file at `path`, or which recording it belongs to.
+
+    Raises:
+        RecordingError: it is not a label file.
+    """
+    try:
+        return msgspec.json.decode(data, type=kind)
     except (msgspec.DecodeError, UnicodeError, RecursionError) as cause:
         raise RecordingError(f"{path} is not a label file: {cause}") from cause
+
+
+def decode_labels(data: bytes, path: str | Path) -> LabelFile:
+    """Decode the content of the label file at `path`.
+
+    Raises:
+        RecordingError: it is not a label file, or does not match its digest.
+    """
+    file = decode_file(data, path, LabelFile)
     if file.digest not in ("", _digest(file)):
         raise RecordingError(
             f"{path} does not match its digest: it is damaged, or was edited by hand; if you "
@@ -140,22 +184,43 @@ def labels_for(path: Path, digest: str) -> Mapping[str, tuple[Label, ...]] | Non
     Raises:
         RecordingError: the file is not a label file, or belongs to another recording.
     """
-    file_path = labels_path(path)
-    if not file_path.exists():
-        return None
-    file = load_labels(file_path)
-    if file.recording != digest:
-        raise RecordingError(
-            f"{file_path} labels another recording ({file.name!r}, hash {file.recording[:12]}) "
-            f"than {path.name} (hash {digest[:12]}): remove it or put its recording back"
-        )
+    data = label_bytes(path)
+    return None if data is None else labels_of(decode_labels(data, labels_path(path)), path, digest)
+
+
+def labels_of(file: LabelFile, path: Path, digest: str) -> Mapping[str, tuple[Label, ...]]:
+    """Return the labels of a label file by module.
+
+    Args:
+        file: content of the file.
+        path: path of the recording.
+        digest: digest of the recording.
+
+    Raises:
+        RecordingError: the file belongs to another recording, or a label is not valid.
+    """
+    check_owner(file, path, digest)
     try:
         return {
             name: tuple(label_of(label) for label in labels)
             for name, labels in file.modules.items()
         }
     except ValueError as cause:
-        raise RecordingError(f"{file_path}: {cause}") from cause
+        raise RecordingError(f"{labels_path(path)}: {cause}") from cause
+
+
+def check_owner(file: LabelOwner, path: Path, digest: str) -> None:
+    """Check that a label file belongs to the recording at `path`, which has this digest.
+
+    Raises:
+        RecordingError: it belongs to another recording.
+    """
+    if file.recording != digest:
+        raise RecordingError(
+            f"{labels_path(path)} labels another recording ({file.name!r}, hash "
+            f"{file.recording[:12]}) than {path.name} (hash {digest[:12]}): remove it or put its "
+            "recording back"
+        )
 
 
 def labels_to_csv(labels: Mapping[str, Sequence[Label]]) -> str:

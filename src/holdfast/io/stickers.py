@@ -5,20 +5,26 @@ until both agree (inverse compositional alignment, Baker and Matthews 2004). All
 the position is exact to a few hundredths of a pixel, where single corners are five times worse.
 """
 
+import re
 from collections.abc import Iterator
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
+from holdfast.files import read_input
 
 Picture = npt.NDArray[np.uint8]
 Array = npt.NDArray[np.float64]
 
 MAX_STAMPS = 50_000_000
 """Largest file of times of pictures [bytes]: four million pictures."""
+_CONTAINER = re.compile(
+    rb"....(ftyp|moov|mdat|wide|free|skip)|RIFF....AVI |\x1a\x45\xdf\xa3|\0\0\x01\xba|G.{187}G",
+    re.DOTALL,
+)
+"""First bytes of MP4 and MOV; AVI; Matroska and WebM; MPEG program and transport streams."""
 PICTURES_PER_PART = 60
 """Pictures after which the poses are passed on."""
 SEARCH_PICTURES, RARE_SEARCH_PICTURES = 3, 60
@@ -49,16 +55,39 @@ def picture_stamps(video: Path) -> Array | None:
         RecordingError: the file has something else, or times that do not increase.
     """
     path = stamps_path(video)
-    if not path.exists():
-        return None
     stamps = np.zeros(2)
-    with suppress(OSError, ValueError):
-        if path.stat().st_size <= MAX_STAMPS:
-            # A process that was killed may have written half of the last line.
-            stamps = np.array([float(line) for line in path.read_text().split("\n")[:-1]])
+    try:
+        text = read_input(path, MAX_STAMPS, follow=False)
+        # A process that was killed may have written half of the last line.
+        stamps = np.array([float(line) for line in text.split(b"\n")[:-1]])
+    except FileNotFoundError:
+        return None
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    except ValueError:  # it is refused below
+        pass
     if not np.isfinite(stamps).all() or (np.diff(stamps) <= 0).any():
         raise RecordingError(f"{path}: a time in each line [s], each later than the last, expected")
     return stamps
+
+
+def check_video(path: Path) -> None:
+    """Check that a file begins as a container of videos.
+
+    FFmpeg opens texts too (`ffconcat`, playlists), which name other files and addresses.
+
+    Raises:
+        RecordingError: it begins with something else, or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            begin = file.read(192)
+    except OSError as cause:
+        raise RecordingError(f"cannot read {path}: {cause.strerror}") from cause
+    if not _CONTAINER.match(begin):
+        raise RecordingError(
+            f"{path} is no video: a file of MP4, MOV, AVI, Matroska, WebM or MPEG expected"
+        )
 
 
 def sticker_poses(
@@ -82,7 +111,9 @@ def sticker_poses(
 
     # The stacks of more threads would count as memory of the child.
     cv2.setNumThreads(1)
-    film = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
+    check_video(path)
+    # An absolute path: FFmpeg takes `concat:a` for an address.
+    film = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG, [cv2.CAP_PROP_N_THREADS, 1])
     if not film.isOpened():
         raise RecordingError(
             f"{path} is no video that OpenCV can decode here: one in H.264, MPEG-4 or MJPEG "

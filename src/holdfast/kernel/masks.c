@@ -57,14 +57,14 @@ HF_SHARED void hf_lose_taxels(
     holdfast_finger_memory *const s = f->state;
     const hf_real n_used = f->finger->n_used;
     holdfast_taxel_set lost = s->lost;
-    hf_real n_lost = 0;
+    size_t n_lost = 0;
     hf_unite(f, &lost, invalid);
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        n_lost += hf_has(&lost, i) ? 1 : 0;
+        n_lost += hf_has(&lost, i);
     }
     s->n_refused += 1;
     if ((hf_real)s->n_refused * f->hand->period >= HF_LOST_SECONDS && !hf_is_empty(f, invalid) &&
-        n_used - n_lost >= HF_MIN_HEALTHY_SHARE * n_used) {
+        n_used - (hf_real)n_lost >= HF_MIN_HEALTHY_SHARE * n_used) {
         s->lost = lost;
         s->lost_faults |= faults;
     }

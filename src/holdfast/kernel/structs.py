@@ -148,3 +148,8 @@ def structs(name: str, rows: Sequence[Mapping[str, Any]]) -> Structs:
     for field in expected if rows else ():
         array[field] = [row[field] for row in rows]
     return array
+
+
+def n_mask_words(n_taxels: int) -> int:
+    """Return how many words of 64 bits a mask of taxels has."""
+    return -(-n_taxels // 64)

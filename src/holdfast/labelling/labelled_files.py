@@ -12,7 +12,15 @@ from holdfast.files import file_stem, refuse_overwrite, write_whole
 from holdfast.io import labels_to_csv, load_dataset, load_recording
 from holdfast.io.file_formats import SUFFIXES
 from holdfast.io.header import label_of
-from holdfast.io.label_files import SUFFIX, labels_for, labels_from_csv, labels_path, load_labels
+from holdfast.io.label_files import (
+    SUFFIX,
+    decode_labels,
+    label_bytes,
+    labels_for,
+    labels_from_csv,
+    labels_path,
+    load_labels,
+)
 from holdfast.labelling.review.confidence import doubtful, state_name
 from holdfast.labelling.review.content import label_seconds
 from holdfast.labelling.rules.forces import evidence_of_contact
@@ -174,11 +182,11 @@ def label_file(
         recording = load_recording(path, labels=False)
         labels = labels_of(recording, path)
         if time is not None:
-            existing = labels_for(path, recording.digest)
-            note = "" if existing is None else load_labels(labels_path(path)).notes
+            data = label_bytes(path)
+            note = "" if data is None else decode_labels(data, labels_path(path)).notes
             save_stored(
                 path, recording, labels,
-                revision=revision_of(path), author=author, time=time, note=note,
+                revision=revision_of(data), author=author, time=time, note=note,
             )  # fmt: skip
         return _document(path, recording, labels)
     except HoldfastError as cause:

@@ -9,7 +9,7 @@ from threading import Event, Thread
 
 from holdfast.errors import OutputError, SourceError, require_extras
 from holdfast.files import refuse_overwrite
-from holdfast.io.stickers import stamps_path
+from holdfast.io.stickers import check_video, stamps_path
 from holdfast.live.recorder import Recorder
 from holdfast.openable import Closable
 
@@ -35,6 +35,7 @@ class CameraRecorder(Closable):
 
     Raises:
         SourceError: there is no such camera.
+        RecordingError: the file is no video.
         OutputError: the video exists already.
     """
 
@@ -43,6 +44,8 @@ class CameraRecorder(Closable):
 
         if path.exists():
             refuse_overwrite(path, force=force)
+        if is_file := Path(camera).is_file():
+            check_video(Path(camera))
         # What OpenCV prints on stderr would be more than the one line of the error.
         level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         self._film = cv2.VideoCapture(int(camera) if camera.isdecimal() else camera)
@@ -55,7 +58,7 @@ class CameraRecorder(Closable):
             )
         self._rate = self._film.get(cv2.CAP_PROP_FPS) or UNSTATED_RATE
         # A file has all its pictures at once; a camera sends them one period apart.
-        self._pause = 1 / self._rate if Path(camera).is_file() else 0.0
+        self._pause = 1 / self._rate if is_file else 0.0
         self.n_pictures = 0
         self._path = path
         # When the newest picture was read: `_write` sets it, `_watch` compares it with the clock.

@@ -1,23 +1,24 @@
 """Health of the modules of a hand: what ten seconds of an open hand show, and what has changed."""
 
 import json
+import math
 import os
 import re
 import time
 from collections.abc import Mapping, Sequence
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
 from holdfast.devices.sources import Source, open_source
 from holdfast.errors import SourceError
-from holdfast.files import write_whole
-from holdfast.recordings import GAP_PERIODS
+from holdfast.files import read_input, write_whole
+from holdfast.recordings import GAP_PERIODS, STARTS_LOADED
 from holdfast.sensors import Sensor, taxel_number
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags
 
 AVERAGED_SECONDS = 0.2
 """Time over which readings are averaged to find a touch and a field [s]."""
@@ -33,10 +34,17 @@ ROUNDING_NOISE = {"count": 0.3, "N": 1e-6}
 """Noise below which a taxel is not compared: that of rounding [unit of the readings]."""
 MAX_KEPT = 50
 """Number of checks of a source that are kept."""
+MAX_HISTORY = 1 << 25
+"""Largest file of checks [bytes]; 50 checks of 368 taxels take 1.2 MB."""
 MIN_CHECKED_SAMPLES = 20
 """Samples of a module from which on its health is known."""
 ARRIVAL_TIMEOUT, EXTRA_SECONDS = 0.2, 5.0
 """Time for which an arrival, and the last sample of the check, is awaited [s]."""
+OPEN_SECONDS = 0.5
+"""Time at the start that shows the readings and the noise of the open hand [s]."""
+TOUCHED_FROM_START = (
+    "{} is touched from the start: open the hand, let nothing touch it, and try again"
+)
 TIMES_IN_WORDS = ("two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -81,23 +89,27 @@ class HealthCheck(msgspec.Struct, frozen=True):
         date: YYYY-MM-DD.
         n_lost: number of packets that are missing by the device's own counter.
         modules: health by module.
+        touch: module that was touched first, and when [s]; what precedes was checked.
     """
 
     date: str
     n_lost: int
     modules: dict[str, ModuleHealth]
+    touch: tuple[str, float] | None = None
 
 
 def check_health(source: Source, seconds: float) -> HealthCheck:
     """Read an open source for some time, with the hand open, and return its health.
 
     Args:
-        source: source of the samples; the hand may turn, but nothing may touch it.
+        source: source of the samples; the hand may turn. What follows the first touch is left out.
         seconds: duration [s].
 
     Raises:
-        SourceError: no samples arrive, or too few; or something touches a module.
+        SourceError: no samples arrive, or too few; or something touches a module from the start.
     """
+    if source.metadata.get(STARTS_LOADED):
+        raise SourceError(TOUCHED_FROM_START.format(source.name))
     kept: dict[str, list[tuple[float, Array]]] = {name: [] for name in source.sensors}
     n_lost, first, end = 0, None, time.monotonic() + seconds + EXTRA_SECONDS
     while not source.ended and time.monotonic() < end:
@@ -112,16 +124,22 @@ def check_health(source: Source, seconds: float) -> HealthCheck:
             kept[name].append((arrival.time, np.array(readings, dtype=np.float64)))
     if first is None:
         raise SourceError(f"{source.name} sends no samples")
-    modules = {
-        name: module_health(
-            name,
-            source.sensors[name],
-            np.array([when for when, _ in samples]),
-            np.array([readings for _, readings in samples]),
-        )
+    touches: list[tuple[float, str]] = []
+    arrays = {
+        name: (np.array([when for when, _ in samples]), np.array([x for _, x in samples]))
         for name, samples in kept.items()
     }
-    return HealthCheck(date.today().isoformat(), n_lost, modules)
+    for name, (times, readings) in arrays.items():
+        if (at := first_touch(name, source.sensors[name], times, readings)) is not None:
+            touches.append((float(times[0]) + at, name))
+    end, touched = min(touches, default=(math.inf, ""))
+    modules = {}
+    for name, (times, readings) in arrays.items():
+        # The means in which the touch was found begin earlier.
+        n = int(np.searchsorted(times, end - AVERAGED_SECONDS))
+        modules[name] = module_health(name, source.sensors[name], times[:n], readings[:n])
+    touch = (touched, round(end - first, 1)) if touches else None
+    return HealthCheck(date.today().isoformat(), n_lost, modules, touch)
 
 
 def check_and_keep(
@@ -165,19 +183,22 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
         raise SourceError(
             f"{name}: {len(times)} samples given, at least {MIN_CHECKED_SAMPLES} expected"
         )
-    zeros = (readings == 0).all(axis=2)
-    lone = zeros & ~zeros.all(axis=0)
-    valid = np.where(lone[:, :, None] | ~np.isfinite(readings), np.nan, readings)
+    valid, lone = _valid(readings)
     changes = np.diff(valid, axis=0)
     noise = np.sqrt(np.nanmean(changes**2, axis=0) / 2)
     steps = np.diff(times)
     period = float(np.median(steps))
     is_gap = steps > GAP_PERIODS * period
     still = ~(np.nan_to_num(changes) != 0).any(axis=0)
-    # The median step of white noise is 1 / 1.05 of its standard deviation. A touch is one large
-    # step, which makes no noise in a median.
-    usual = 1.05 * np.nanmedian(np.abs(changes), axis=0)
-    field = _common_field(name, sensor, times, valid, usual)
+    usual = _usual_noise(valid)
+    moves = _moves(sensor, times, valid, usual, valid)
+    if moves.touched.any():
+        at = (int(np.argmax(moves.touched)) + 0.5) * moves.period
+        raise SourceError(
+            f"{name} was touched at {at:.1f} s: open the hand, let nothing touch it, and try again"
+        )
+    largest = float(moves.field.max()) if sensor.magnetic else 0.0
+    least = FIELD_TO_NOISE * _typical(sensor, usual) / np.sqrt(sensor.n_taxels)
     axes = [(i, a) for i, a in np.argwhere(still & ~still.all(axis=1)[:, None]).tolist()]
     return ModuleHealth(
         sensor=sensor.name,
@@ -192,40 +213,100 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
         n_zeros=int(lone.any(axis=1).sum()),
         lowest=float(np.nanmin(valid)),
         highest=float(np.nanmax(valid)),
-        field=field,
+        field=largest if largest > least else 0.0,
     )
 
 
-def _common_field(name: str, sensor: Sensor, times: Array, valid: Array, noise: Array) -> float:
-    """Return the largest common change of the taxels; refuse a module that is touched."""
+def first_touch(name: str, sensor: Sensor, times: Array, readings: Array) -> float | None:
+    """Return when something touches an open module first [s]; None if nothing does.
+
+    Args:
+        name: of the module.
+        sensor: of the module.
+        times: (n,) times of the samples [s].
+        readings: (n, n_taxels, 3) readings.
+
+    Raises:
+        SourceError: it is touched from the start: too early to check what precedes, or the first
+            change lets it go.
+    """
+    if len(times) < MIN_CHECKED_SAMPLES:
+        return None  # `module_health` refuses it
+    valid, _ = _valid(readings)
+    n = max(MIN_CHECKED_SAMPLES, int(np.searchsorted(times, times[0] + OPEN_SECONDS)))
+    moves = _moves(sensor, times, valid, _usual_noise(valid[:n]), valid[:n])
+    if not moves.touched.any():
+        return None
+    k = int(np.argmax(moves.touched))
+    at = (k + 0.5) * moves.period
+    pushed = moves.pushed[k]
+    n_open = np.searchsorted(times, times[0] + at - AVERAGED_SECONDS)
+    if n_open < MIN_CHECKED_SAMPLES or -pushed.min() > pushed.max():
+        raise SourceError(TOUCHED_FROM_START.format(name))
+    return float(at)
+
+
+class _Moves(NamedTuple):
+    """Changes of the readings of a module, averaged over blocks of a `period` [s].
+
+    Attributes:
+        period: of a block [s].
+        touched: (n_blocks,) whether a taxel moves against the others.
+        pushed: (n_blocks, n_taxels) change of the normal component [unit].
+        field: (n_blocks,) size of the change that all taxels have in common [unit].
+    """
+
+    period: float
+    touched: Flags
+    pushed: Array
+    field: Array
+
+
+def _valid(readings: Array) -> tuple[Array, Flags]:
+    """Return readings with NaN for lone zeros and what is not finite; and where zeros are lone."""
+    zeros = (readings == 0).all(axis=2)
+    lone = zeros & ~zeros.all(axis=0)
+    return np.where(lone[:, :, None] | ~np.isfinite(readings), np.nan, readings), lone
+
+
+def _usual_noise(valid: Array) -> Array:
+    """Return the noise of each axis from the median step, in which a touch makes none."""
+    # The median step of white noise is 1 / 1.05 of its standard deviation.
+    return np.asarray(1.05 * np.nanmedian(np.abs(np.diff(valid, axis=0)), axis=0))
+
+
+def _moves(sensor: Sensor, times: Array, valid: Array, noise: Array, rest: Array) -> _Moves:
+    """Return how the taxels move against each other, and together, from the median of `rest`."""
     block = max(1, round(AVERAGED_SECONDS * (len(times) - 1) / float(times[-1] - times[0])))
     n = len(times) // block
     means = np.nanmedian(valid[: n * block].reshape(n, block, *valid.shape[1:]), axis=1)
-    moved = means - np.nanmedian(means, axis=0)
+    moved = means - np.nanmedian(rest, axis=0)
     turned = np.einsum("ijk,nik->nij", sensor.rotations, moved)
     # A field is common in one of two frames (`kernel/field.c`): in that where less is left.
     both = [x - x.mean(axis=1, keepdims=True) for x in (moved, turned)]
     frame = int((both[1] ** 2).sum() < (both[0] ** 2).sum())
-    common = (moved, turned)[frame].mean(axis=1)
+    size = np.sqrt(((moved, turned)[frame].mean(axis=1) ** 2).sum(axis=1))
     apart = both[frame] if sensor.magnetic else moved
-    # The noise of the module: one taxel that is far noisier than the others was not touched.
-    typical = max(float(np.median(noise)), ROUNDING_NOISE[sensor.unit])
-    size = np.sqrt((common**2).sum(axis=1))
     # By a tenth, the gains of magnetometers differ: so much of a field is not common.
-    limit = TOUCH_TO_NOISE * np.maximum(noise, typical) + 0.1 * size[:, None, None]
+    limit = TOUCH_TO_NOISE * np.maximum(noise, _typical(sensor, noise)) + 0.1 * size[:, None, None]
     touched = (np.abs(apart) > limit).any(axis=(1, 2))
-    if touched.any():
-        at = (int(np.argmax(touched)) + 0.5) * block / (len(times) - 1) * (times[-1] - times[0])
-        raise SourceError(
-            f"{name} was touched at {at:.1f} s: open the hand, let nothing touch it, and try again"
-        )
-    largest = float(size.max()) if sensor.magnetic else 0.0
-    return largest if largest > FIELD_TO_NOISE * typical / np.sqrt(sensor.n_taxels) else 0.0
+    period = block / (len(times) - 1) * float(times[-1] - times[0])
+    pushed = moved[:, :, 2] - (moved[:, :, 2].mean(axis=1, keepdims=True) if sensor.magnetic else 0)
+    return _Moves(period, touched, pushed, size)
+
+
+def _typical(sensor: Sensor, noise: Array) -> float:
+    """Return the noise of a module: a taxel that is far noisier than the others is not touched."""
+    return max(float(np.median(noise)), ROUNDING_NOISE[sensor.unit])
 
 
 def changes_since(check: HealthCheck, last: HealthCheck | None) -> list[str]:
     """Return what is wrong, and what has become worse since the last check, one line each."""
     found = [f"{check.n_lost} packets were lost"] if check.n_lost else []
+    if check.touch is not None:
+        found.append(
+            f"{check.touch[0]} was touched at {check.touch[1]} s: only what precedes was checked"
+        )
     for name, now in check.modules.items():
         found += [f"taxel {taxel} of {name} is dead" for taxel in now.dead]
         found += [f"axis {x[-1]} of taxel {x[:-2]} of {name} never changes" for x in now.stuck]
@@ -267,11 +348,12 @@ def read_history(path: Path) -> list[HealthCheck]:
         SourceError: the file is none of checks.
     """
     try:
-        return msgspec.json.decode(path.read_bytes(), type=list[HealthCheck])
+        return msgspec.json.decode(read_input(path, MAX_HISTORY), type=list[HealthCheck])
     except FileNotFoundError:
         return []
     except (OSError, ValueError) as cause:
-        raise SourceError(f"{path} is no history of checks: {cause}; delete it") from cause
+        why = cause.strerror if isinstance(cause, OSError) else cause
+        raise SourceError(f"{path} is no history of checks: {why}; delete it") from cause
 
 
 def keep(path: Path, history: Sequence[HealthCheck], check: HealthCheck) -> None:

@@ -31,6 +31,12 @@ from holdfast.sensors.types import Array
 Onsets = Literal["truth", "labels", "rule", "mixed"]
 """Where onsets come from: the truth, labels, labels by a rule (if any are), or truth and labels."""
 
+ORIGINS: dict[Onsets, str] = {
+    "truth": "by the truth", "labels": "by labels", "rule": "by labels of a rule",
+    "mixed": "by truth or labels",
+}  # fmt: skip
+"""Where onsets come from, in words."""
+
 BY_RULE = "rule:"
 """Beginning of the author of a label that a rule made."""
 MARGIN_RULES = ("rule:signal", "rule:tracking")

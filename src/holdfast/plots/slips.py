@@ -13,6 +13,7 @@ from holdfast.metrics import Decisions
 from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.slip_curves import SlipSummary
 from holdfast.metrics.slips import FOUND_WITHIN, SlipCounts, SlipMetrics, count_slips
+from holdfast.metrics.truth_labels import ORIGINS
 from holdfast.plots import COLOURS
 from holdfast.plots.style import (
     FAINT,
@@ -150,8 +151,7 @@ def draw_slips_found(axes: Axes, decisions: Sequence[Decisions], slips: SlipMetr
     axes.set(xlim=DELAY_LIMITS, ylim=(0, 1.02))
     axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     add_labels(axes, "time since the onset of the slip [s]", "slips found by then")
-    origin = {"truth": "by the truth", "labels": "by labels", "mixed": "by truth or labels"}
-    add_title(axes, f"slips of fingers: {slips.n} {origin[slips.onsets]}")
+    add_title(axes, f"slips of fingers: {slips.n} {ORIGINS[slips.onsets]}")
     if axes.get_legend_handles_labels()[0]:
         axes.legend(
             fontsize=FONT_SIZE, loc="upper left", borderaxespad=0.1, framealpha=1.0,

@@ -133,6 +133,23 @@ def anyskin() -> Sensor:
     return Sensor("anyskin", positions, rotations, np.array([0.0, 0.0, 1.0]), rate=100.0)
 
 
+def _orca(name: str) -> Sensor:
+    """Return an ORCA Touch fingertip. Forces of all taxels have the axes of the module."""
+    rows = [row for row in _table("orca.csv") if row["sensor"] == name]
+    positions = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
+    return Sensor(
+        name,
+        positions,
+        np.tile(np.eye(3), (len(rows), 1, 1)),
+        np.array([0.0, 0.0, 1.0]),
+        rate=100.0,
+        unit="N",
+        range=(-12.8, 25.5),  # int8 counts along x and y, uint8 counts along z
+        step=0.1,
+        rests_at_zero=True,
+    )
+
+
 @cache
 def allegro_uskin() -> Hand:
     """Return the Allegro hand with 18 uSkin modules, which report in one packet of 368 taxels."""
@@ -171,6 +188,7 @@ SENSORS = {
     "anyskin": anyskin,
     # 3 x 3 pillars, which send newtons; nominal pitch.
     "papillarray": cache(partial(_grid, "papillarray", (3, 3), (7e-3, 7e-3), 1000.0, unit="N")),
+    **{name: cache(partial(_orca, name)) for name in ("orca-finger", "orca-thumb", "orca-pinky")},
 }
 """Functions that make the built-in sensors, by name."""
 HANDS = {"allegro-uskin": allegro_uskin}

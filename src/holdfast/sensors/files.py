@@ -101,6 +101,8 @@ def sensor_rows(skin: Sensor) -> list[tuple[str, object]]:
         ("unit", skin.unit),
         ("rate", f"{skin.rate:g} Hz"),
         ("range", ends),
+        *([] if skin.step is None else [("step", f"{skin.step:g} {skin.unit}")]),
+        *([("at rest", "exactly zero")] if skin.rests_at_zero else []),
         ("normal", f"({normal}) in the fingertip frame"),
     ]
 

@@ -28,6 +28,9 @@ MAGNETIC_SENSORS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin")
 
 The sections of `gtac` lie on different fingers, and half of what they read is no field."""
 
+RESTING_SENSORS = ("gtac",)
+"""Built-in sensors that rest at exact zero. Files do not repeat it for them."""
+
 ROTATION_TOLERANCE = 1e-5
 """Maximum error of a rotation matrix as read; tables are rounded to six digits."""
 
@@ -59,9 +62,13 @@ class Sensor:
             of most taxels near an end of it are a fault.
         magnetic: whether each taxel is a magnetometer, which also reads the earth's field. None
             stands for what is known by the name: True for the built-in `uskin-*` and `anyskin`.
+        step: smallest change of a reading [unit]; None if unknown.
+        rests_at_zero: whether every reading is exactly zero without contact. None takes what the
+            name of a built-in sensor says, false for any other.
 
     Raises:
-        ValueError: a shape is wrong, a number is not finite, or a rotation is not valid.
+        ValueError: a shape is wrong, a number is not finite, a rotation is not valid, or the range
+            contradicts `step` or `rests_at_zero`.
     """
 
     name: str
@@ -72,6 +79,8 @@ class Sensor:
     unit: Unit = "count"
     range: tuple[float, float] | None = None
     magnetic: bool | None = None
+    step: float | None = None
+    rests_at_zero: bool | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -103,6 +112,7 @@ class Sensor:
                     f"range of {self.name}: smallest, largest expected, {low}, {high} given"
                 )
             object.__setattr__(self, "range", (low, high))
+        self._check_step()
         rotations = _exact_rotations(rotations, self.name)
         length = float(np.linalg.norm(normal)) if longest < 1e100 else np.inf
         if not 1e-100 < length < np.inf:  # the squares in the norm overflow, or all become zero
@@ -114,6 +124,30 @@ class Sensor:
         ):  # fmt: skip
             values.flags.writeable = False
             object.__setattr__(self, name, values)
+
+    def _check_step(self) -> None:
+        low, high = self.range or (-np.inf, np.inf)
+        if self.step is not None:
+            is_number = isinstance(self.step, int | float) and not isinstance(self.step, bool)
+            if not (is_number and 0 < self.step < np.inf):
+                raise ValueError(f"{self.name}: a step above 0 expected, {self.step!r} given")
+            if self.step > high - low:
+                raise ValueError(
+                    f"{self.name}: a step within the range of {low:g} to {high:g} expected, "
+                    f"{self.step:g} given"
+                )
+            object.__setattr__(self, "step", float(self.step))
+        if self.rests_at_zero is None:
+            object.__setattr__(self, "rests_at_zero", self.name in RESTING_SENSORS)
+        if not isinstance(self.rests_at_zero, bool):
+            raise ValueError(
+                f"{self.name}: rests_at_zero true or false expected, {self.rests_at_zero!r} given"
+            )
+        if self.rests_at_zero and not low <= 0 <= high:
+            raise ValueError(
+                f"{self.name}: a sensor that rests at zero has zero in its range, "
+                f"{low:g} to {high:g} given"
+            )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
@@ -127,7 +161,10 @@ class Sensor:
         """Return whether two sensors are the same, but for the last digits of numbers."""
         if self is other or not isinstance(other, Sensor):
             return self is other
-        own, given = ((x.name, x.n_taxels, x.unit, x.range, x.magnetic) for x in (self, other))
+        own, given = (
+            (x.name, x.n_taxels, x.unit, x.range, x.magnetic, x.step, x.rests_at_zero)
+            for x in (self, other)
+        )
         return (
             own == given
             and abs(self.rate - other.rate) <= EQUAL_TOLERANCE * self.rate
@@ -147,7 +184,7 @@ class Sensor:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the sensor as plain data, in the form that `from_json` reads."""
-        fields = {
+        fields: dict[str, Any] = {
             "name": self.name,
             "positions": self.positions.tolist(),
             "rotations": self.rotations.tolist(),
@@ -157,8 +194,13 @@ class Sensor:
             "range": None if self.range is None else list(self.range),
         }
         # Only what the name does not say: files of built-in sensors are as before version 0.4.
-        is_known = self.magnetic == (self.name in MAGNETIC_SENSORS)
-        return fields if is_known else fields | {"magnetic": self.magnetic}
+        if self.magnetic != (self.name in MAGNETIC_SENSORS):
+            fields["magnetic"] = self.magnetic
+        if self.step is not None:
+            fields["step"] = self.step
+        if self.rests_at_zero != (self.name in RESTING_SENSORS):
+            fields["rests_at_zero"] = self.rests_at_zero
+        return fields
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -170,8 +212,8 @@ class Sensor:
             ValueError: a field is missing, unknown, or not valid for `Sensor`.
         """
         data = with_range(data)
-        known = {"name", "positions", "rotations", "normal", "rate", "unit", "range", "magnetic"}
-        needed = known - {"unit", "range", "magnetic"}
+        needed = {"name", "positions", "rotations", "normal", "rate"}
+        known = needed | {"unit", "range", "magnetic", "step", "rests_at_zero"}
         if unknown := sorted(set(data) - known):
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
@@ -185,6 +227,8 @@ class Sensor:
             unit=data.get("unit", "count"),
             range=data.get("range"),
             magnetic=data.get("magnetic"),
+            step=data.get("step"),
+            rests_at_zero=data.get("rests_at_zero"),
         )
 
     @classmethod

@@ -1,11 +1,12 @@
 """Reading of a dataset, with progress, and its scan: names, sensors, and checks that they agree."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from holdfast.blocks import Digests
 from holdfast.detection import EXACT_RATE, RELATIVE_RATES
 from holdfast.errors import TrainingError
 from holdfast.recordings import Recording
@@ -75,6 +76,7 @@ class ScannedRecording:
         name: of the recording.
         digest: of its samples.
         readings_digest: of its readings alone, which a copy with other times shares.
+        blocks: of its readings, of which a part of it has some.
         object: object that was held; None if the metadata do not name it.
         rate: samples per second [Hz].
         n_labelled: number of labelled samples of each finger that has any.
@@ -87,6 +89,7 @@ class ScannedRecording:
     object: str | None
     rate: float
     n_labelled: dict[str, int]
+    blocks: Digests = field(compare=False)
     step: int = 1
 
 
@@ -167,7 +170,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
     """
     recording.check_modules_differ()
     # Of the file as it is, before repeats are left out: a model names what it was trained on.
-    digest, readings_digest = recording.digest, recording.readings_digest
+    digest, readings_digest, blocks = recording.digest, recording.readings_digest, recording.blocks
     recording = true_updates(recording)
     modules = {name: module for name, module in recording.modules.items() if module.labels}
     counts = {name: int((module.label_states > 0).sum()) for name, module in modules.items()}
@@ -189,6 +192,7 @@ def scan_recording(recording: Recording, *, relative: bool = False) -> Recording
         object=None if held_object is None else str(held_object),
         rate=recording.rate,
         n_labelled=counts,
+        blocks=blocks,
         step=step,
     )
     return RecordingScan(scanned, {name: modules[name].sensor for name in counts})

@@ -97,8 +97,11 @@ def compute_decisions_and_tare(model: Model, recording: Recording) -> tuple[Deci
 
 
 def was_trained_on(model: Model, recording: Recording | ScannedRecording) -> bool:
-    """Return whether a model was trained on a recording, or on a copy with other times."""
-    return model.training is not None and _is_among(recording, [model.training.recordings])
+    """Return whether a model was trained on a recording, a part of it, or what it is a part of."""
+    training = model.training
+    return training is not None and (
+        _is_among(recording, [training.recordings]) or training.has_any(recording.blocks)
+    )
 
 
 def was_tuned_on(model: Model, recording: Recording) -> bool:

@@ -220,4 +220,5 @@ def training_record(
         samples=dict(thinned) or UNSET,
         sliding_samples=dict(sliding) or UNSET,
         versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
+        blocks=UNSET if init is None else init.blocks,
     )

@@ -1,6 +1,6 @@
-"""Own handling: the held samples of recordings of ordinary use, which have no labels.
+"""Own handling: the held samples of recordings of ordinary use, which need no labels.
 
-What is held follows from the model's own rule of contact.
+What is held follows from the model's own rule of contact. Labels of slip, if any, refuse it.
 """
 
 import math
@@ -10,14 +10,14 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Reason, faults_of
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Cause, Reason, faults_of
 from holdfast.detection import ANY_FINGER, Debounce, FingerTrace, Model, detect
 from holdfast.detection.features import extract
 from holdfast.errors import TrainingError
 from holdfast.metrics.decisions import Codes
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_truth import sample_durations
-from holdfast.recordings import BASELINES, Recording
+from holdfast.recordings import BASELINES, Recording, shown_origin
 from holdfast.resampling import at_rate
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
@@ -37,6 +37,9 @@ MAX_EDGE_SHARE = 0.25
 """It is at most this share of the time from closing to opening."""
 MAX_FAULTY_SHARE = 0.1
 """Own handling is refused if a finger is UNKNOWN by faults in more than this share of it."""
+MAX_SLIP_SHARE = 0.01
+"""Own handling is refused if its labels call more than this share of the held time a slip."""
+MAX_SLIPS_SHOWN = 3
 CHANGE_SECONDS = 0.5
 """Interval over which the change of the load is measured [s]."""
 MIN_SCALE = 0.3
@@ -106,6 +109,10 @@ class OwnHandling:
     digests: dict[str, str] = field(default_factory=dict)
     n_left_out: int = 0
     _faults: dict[str, _Faults] = field(default_factory=dict)
+    # Of all fingers: held time and the part of it that is labelled as slip [s], and these labels.
+    _held_seconds: float = 0.0
+    _slip_seconds: float = 0.0
+    _slips: list[str] = field(default_factory=list)
 
     def add(self, recording: Recording) -> None:
         """Add a recording; leave it out if the held time is long enough already.
@@ -134,6 +141,7 @@ class OwnHandling:
                 before.n_faulty + int(faulty.sum()), before.n + len(trace), before.mask | mask
             )
             self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)
+            self._add_slips(recording, name, trace)
 
     def fingers(self, key: HandlingKey) -> dict[str, float]:
         """Return the held time of each finger of a key [s]."""
@@ -162,11 +170,20 @@ class OwnHandling:
         return math.nan if len(changes) else 0.0
 
     def check(self) -> None:
-        """Check that the fingers have few faults, and that one holds something long enough.
+        """Check that the fingers have few faults and slips, and that one holds long enough.
 
         Raises:
             TrainingError: they have too many, or none does.
         """
+        if self._slip_seconds > MAX_SLIP_SHARE * self._held_seconds:
+            share = 100 * self._slip_seconds / self._held_seconds
+            more = ", ..." if len(self._slips) > MAX_SLIPS_SHOWN else ""
+            raise TrainingError(
+                f"{share:.2g} % of the held time is labelled as slip, at most "
+                f"{100 * MAX_SLIP_SHARE:g} % expected: {', '.join(self._slips[:MAX_SLIPS_SHOWN])}"
+                f"{more}; ordinary handling without slip expected, pushes and pulls that hold "
+                "included"
+            )
         for finger, (n_faulty, n, mask) in self._faults.items():
             if n_faulty > MAX_FAULTY_SHARE * n:
                 names = ", ".join(fault.value for fault in faults_of(mask))
@@ -187,6 +204,18 @@ class OwnHandling:
                 f"{rounded:.1f} s of holding given, at least {MIN_HANDLING:g} s expected "
                 f"({ENOUGH_HANDLING:g} s or more are better)"
             )
+
+    def _add_slips(self, recording: Recording, finger: str, trace: FingerTrace) -> None:
+        """Add the held time of a finger, and the labels of slip within it."""
+        touching = grasped_samples(trace.times, trace.state, edge_seconds=0.0)
+        durations = grasped_durations(trace.times) * touching
+        self._held_seconds += float(durations.sum())
+        for label in recording.modules[finger].labels:
+            inside = (trace.times >= label.start) & (trace.times < label.end)
+            if label.cause is Cause.SLIP and (inside & touching).any():
+                self._slip_seconds += float(durations[inside].sum())
+                start, end = (t - shown_origin(recording.start) for t in (label.start, label.end))
+                self._slips.append(f"{finger} {start:.2f} to {end:.2f} s of {recording.name}")
 
     def _add_finger(
         self, name: str, sensor: Sensor, trace: FingerTrace, features: Array, *, loaded: bool

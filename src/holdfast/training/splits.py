@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from holdfast.blocks import Digests
 from holdfast.errors import TrainingError
 from holdfast.sensors.types import Integers
 from holdfast.training.classifiers.fitting import Samples
@@ -83,7 +84,8 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
         seed: of the random split.
 
     Raises:
-        TrainingError: there are fewer than two units, or a recording does not name its object.
+        TrainingError: there are fewer than two units, a recording does not name its object, or two
+            units share readings.
     """
     names = [recording.object if split == "object" else recording.name for recording in recordings]
     unnamed = [
@@ -107,7 +109,41 @@ def split_data(recordings: Sequence[ScannedRecording], split: Split, seed: int) 
             f"the split by {split} needs at least two, {len(groups)} given ({groups[0]}); the "
             "split by time needs one recording"
         )
+    check_nothing_shared(
+        [recording.name for recording in recordings],
+        [recording.blocks for recording in recordings],
+        group_of,
+        ", or give both the same object in their metadata and use --split object",
+    )
     return DataSplit(split, tuple(groups), group_of, seed, rates)
+
+
+def check_nothing_shared(
+    names: Sequence[str], blocks: Sequence[Digests], groups: Integers, hint: str = ""
+) -> None:
+    """Check that no two recordings of different groups share readings.
+
+    Args:
+        names: of the recordings.
+        blocks: of each.
+        groups: (n_recordings,) group that is held out together.
+        hint: what can be done instead of removing one of them.
+
+    Raises:
+        TrainingError: two share a block.
+    """
+    owners = np.repeat(np.arange(len(blocks)), [len(own) for own in blocks])
+    digests = np.concatenate(blocks)
+    order = np.argsort(digests, kind="stable")
+    owners, digests = owners[order], digests[order]
+    first, second = owners[:-1], owners[1:]
+    shared = np.flatnonzero((digests[1:] == digests[:-1]) & (groups[first] != groups[second]))
+    if len(shared):
+        one, other = names[first[shared[0]]], names[second[shared[0]]]
+        raise TrainingError(
+            f"recordings {one!r} and {other!r} share readings: one would be tested by a model that "
+            f"was trained on the other; remove one of them{hint}"
+        )
 
 
 def inner_folds(samples: Samples, n_folds: int, seed: int) -> list[npt.NDArray[np.bool_]]:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from holdfast.blocks import Digests
 from holdfast.detection import ANY_FINGER, Head, Model, Training
 from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan, Tare
@@ -39,6 +40,7 @@ from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast.training.dataset_scan import OneRecording, Progress, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.head_fits import fit_slip
+from holdfast.training.splits import check_nothing_shared
 from holdfast.training.targets import TargetInput, TargetSamples, slip_target
 from holdfast.training.thresholds import N_SHOWN, CurvePoint
 
@@ -154,6 +156,7 @@ class TaughtPart(NamedTuple):
     Attributes:
         name: of the recording.
         digest: of its readings.
+        blocks: of its readings.
         sensors: sensor of each finger whose slips are known.
         samples: of the target `slip`, of all these fingers; their unit is the recording.
         n_slips: number of slips of these fingers.
@@ -161,6 +164,7 @@ class TaughtPart(NamedTuple):
 
     name: str
     digest: str
+    blocks: Digests
     sensors: Mapping[str, Sensor]
     samples: TargetSamples | None
     n_slips: int
@@ -224,6 +228,8 @@ def teach_with_report(
     read = engine.map_ordered(_read_part, calls, shared=(model,))
     parts = {k: part for k, part in enumerate(progress(read, "reading", n)) if part.samples}
     samples = _joined(list(parts.values()), n)
+    blocks = [part.blocks for part in parts.values()]
+    check_nothing_shared([part.name for part in parts.values()], blocks, np.arange(len(parts)))
     base = _base_of(model, list(parts.values()))
 
     # A head that is scored on a recording was fitted without it, and without those of its fold.
@@ -262,7 +268,7 @@ def teach_with_report(
     )
     name = f"{model.name.removesuffix(TAUGHT_SUFFIX)}{TAUGHT_SUFFIX}"
     return Taught(
-        msgspec.structs.replace(taught, training=record, name=name),
+        msgspec.structs.replace(taught.with_training(record, blocks), name=name),
         slips,
         slip_summary(counts_of_base) if any(counts_of_base) else None,
         _hand_alarms(curves, index),
@@ -316,6 +322,7 @@ def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPar
     return TaughtPart(
         recording.name,
         recording.readings_digest,
+        part[0].blocks,
         known,
         TargetSamples.joined(samples) if samples else None,
         sum(len(truth.slips) for truth in truths.values()),

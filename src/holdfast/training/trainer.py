@@ -155,7 +155,8 @@ def train(
             if model.finger(finger).slip is not None
         },
     )
-    model = msgspec.structs.replace(model, training=provenance)
+    blocks = [recording.blocks for recording in trainer.data.scan.recordings]
+    model = model.with_training(provenance, blocks)
     init = trainer.setting.init
     known = () if init is None else tuple(known_recordings(init, trainer.data.scan))
     tares = LoadedTares(scored.n_loaded, len(recordings))

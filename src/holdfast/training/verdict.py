@@ -10,6 +10,7 @@ from typing import NamedTuple
 from holdfast.metrics import Metrics, SampleMetrics
 from holdfast.metrics.slip_curves import SlipSummary
 from holdfast.metrics.statistics import Interval
+from holdfast.metrics.truth_labels import ORIGINS
 
 CHANCE_AUC = 0.55
 """An AUC up to this is no better than chance, for the few recordings that users have."""
@@ -233,7 +234,7 @@ def _by_slips(summary: SlipSummary, n_recordings: int, *, in_sample: bool) -> st
             f" for an automatic reaction to slips: {how} {100 - missed.value:.0f} %{least}, "
             f"{100 - most_missed:g} % needed at {most_alarms:g} false alarms a minute"
         )
-    origin = {"mixed": " (by truth or labels)", "truth": ""}.get(slips.onsets, " (by labels)")
+    origin = "" if slips.onsets == "truth" else f" ({ORIGINS[slips.onsets]})"
     return (
         f"Slips: {slips.incipient['0.1']:.0f} % of {slips.n} slip{'s' * (slips.n != 1)} of "
         f"fingers{origin} found within 0.1 s{rate}; {use}."

@@ -2,19 +2,22 @@
 
 import math
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
+import numpy.typing as npt
 
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
 from holdfast.recordings import Recording, Tactile, Truth
-from holdfast.sensors import sensor
+from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
 from holdfast.twin.control import STEPS_PER_CONTROL, draw_controller
+from holdfast.twin.force_skin import FORCE_SENSORS, ForceReadout, ForceSkin
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.impacts import NO_IMPACT, Impact, ImpactState, draw_impacts, impact_state
@@ -35,7 +38,7 @@ from holdfast.twin.protocol import (
 from holdfast.twin.slip_events import NO_SLIP, SlipEvents, SlipState, draw_course
 from holdfast.twin.steps import tremor_at
 from holdfast.twin.uskin import Uskin, with_server_effects
-from holdfast.twin.uskin_readout import Counts, Readout, UskinParameters
+from holdfast.twin.uskin_readout import Readout, UskinParameters
 from holdfast.twin.world import TruthLog, World, fingertip_of
 
 RETRY_DEPTH_FACTOR = 0.75
@@ -51,6 +54,12 @@ PLACE_SPREAD, TURN_SPREAD = 0.002, 0.05
 """Standard deviations of the object's position [m] and turn [rad], as a person places it."""
 GRIP_SPREAD = 0.1
 """Standard deviation, over grasps, of the logarithm of the load at which the fingers stop."""
+USKIN = "uskin-curved"
+"""Sensor whose surface the fingertips have."""
+FINGERTIP_SENSORS = (USKIN, *FORCE_SENSORS)
+"""Sensors that the fingertips can have."""
+
+Readings = npt.NDArray[Any]
 
 
 @dataclass(frozen=True)
@@ -69,6 +78,7 @@ class Grasp:
         glitch_rate: glitches of the hand's controller per second [1/s]; None for the profile's.
         plant: name of the plant, see `holdfast.twin.plant`.
         faults: troubles of the skins.
+        sensor: name of the sensor of every fingertip, of `FINGERTIP_SENSORS`.
     """
 
     object: str
@@ -82,6 +92,7 @@ class Grasp:
     glitch_rate: float | None = None
     plant: str = MILD
     faults: MagneticFaults = WITHOUT_FAULTS
+    sensor: str = USKIN
 
     @property
     def item(self) -> GraspObject:
@@ -91,6 +102,22 @@ class Grasp:
             ValueError: the table has no object of that name.
         """
         return _object(self.object, self.table)
+
+    @property
+    def fingertip(self) -> Sensor:
+        """Sensor of every fingertip.
+
+        Raises:
+            ValueError: the twin has no such fingertips, or none with these faults.
+        """
+        if self.sensor not in FINGERTIP_SENSORS:
+            raise ValueError(
+                f"no fingertips with the sensor {self.sensor!r}; there are "
+                f"{', '.join(FINGERTIP_SENSORS)}"
+            )
+        if self.sensor != USKIN and not self.faults.changes_nothing:
+            raise ValueError(f"faults are those of {USKIN}; the sensor {self.sensor} given")
+        return sensor(self.sensor)
 
     @property
     def name(self) -> str:
@@ -117,7 +144,7 @@ class Simulation:
 
     Args:
         grasp: the grasp.
-        parameters: parameters of the skin; by default `UskinParameters()`.
+        parameters: parameters of a uSkin; by default `UskinParameters()`.
         plan: plan of the grasp; by default the one that is drawn for it.
         loads: loads on the held object, in addition to the disturbances of the plan.
 
@@ -125,12 +152,13 @@ class Simulation:
         grasp: the grasp.
         world: its physical state.
         protocol: its course.
-        uskins: skin of each fingertip.
+        skins: skin of each fingertip.
         n_samples: number of samples so far.
         command: command of the last sample.
 
     Raises:
-        ValueError: object, profile, plant or case is unknown, or the object cannot be grasped.
+        ValueError: object, profile, plant, case or sensor is unknown, or the object cannot be
+            grasped.
     """
 
     def __init__(
@@ -150,8 +178,8 @@ class Simulation:
         self.grasp, self._profile, self._loads = grasp, chosen, loads
         self.plan = plan or draw_plan(grasp, chosen)
         self.world = _world(grasp, chosen)
-        skin = parameters or UskinParameters()
-        self.uskins = {f: _skin(grasp.seed, f, skin, chosen.coupled) for f in FINGERS}
+        tip, skin = grasp.fingertip, parameters or UskinParameters()
+        self.skins = {f: _skin(grasp.seed, f, tip, skin, chosen.coupled) for f in FINGERS}
         self.protocol = Protocol(self.plan, 1 / RATE)
         self.command: Command | None = None
         self.n_samples = 0
@@ -165,7 +193,7 @@ class Simulation:
         self._truth_log = TruthLog(FINGERS)
         self._bodies: list[Array] = []  # (4, 18) of each sample
         self._taxel_forces: list[Array] = []  # (4, n_taxels, 3) of each sample [N]
-        self._readouts: dict[str, Readout] = {}
+        self._readouts: dict[str, Readout | ForceReadout] = {}
 
     @property
     def time(self) -> float:
@@ -232,7 +260,7 @@ class Simulation:
             **slip_truth,
         )
         self._bodies.append(world.bodies[:-1].copy())
-        skin = self.uskins[FINGERS[0]]  # all fingertips have the same nodes and taxels
+        skin = self.skins[FINGERS[0]]  # all fingertips have the same nodes and taxels
         self._taxel_forces.append(skin.taxel_forces(world.contact.node_forces))
         self.command = command
         self.n_samples += 1
@@ -260,25 +288,24 @@ class Simulation:
         """Return the joint angles (16,) that the hand's driver publishes now [rad]."""
         return self.world.controller.published.copy()
 
-    def read(self) -> dict[str, Counts]:
-        """Return the counts (n_taxels, 3) of the last sample; call it after every `step`."""
+    def read(self) -> dict[str, Readings]:
+        """Return the readings (n_taxels, 3) of the last sample; call it after every `step`."""
         time = np.array([(self.n_samples - 1) / RATE])
-        counts = {}
-        for (finger, uskin), forces in zip(
-            self.uskins.items(), self._taxel_forces[-1], strict=True
-        ):
+        readings = {}
+        for (finger, skin), forces in zip(self.skins.items(), self._taxel_forces[-1], strict=True):
             if finger not in self._readouts:
-                self._readouts[finger] = uskin.readout(self.grasp.generator(f"skin {finger}"))
-            counts[finger] = self._readouts[finger].counts(forces[None], time)
-        return {finger: own[0] for finger, own in self._with_faults(counts, time).items()}
+                self._readouts[finger] = skin.readout(self.grasp.generator(f"skin {finger}"))
+            readings[finger] = self._readouts[finger].read(forces[None], time)
+        return {finger: own[0] for finger, own in self._with_faults(readings, time).items()}
 
-    def _with_faults(self, counts: dict[str, Counts], times: Array) -> dict[str, Counts]:
-        """Return the counts (n, n_taxels, 3) of each finger with the troubles of the skins."""
+    def _with_faults(self, readings: dict[str, Readings], times: Array) -> Mapping[str, Readings]:
+        """Return the readings (n, n_taxels, 3) of each finger with the troubles of the skins."""
         if self.grasp.faults.changes_nothing:
-            return counts
-        sensors = {finger: uskin.sensor for finger, uskin in self.uskins.items()}
-        rest = {finger: uskin.taxels.baseline for finger, uskin in self.uskins.items()}
-        return self.grasp.faults.apply(sensors, counts, times, rest, self.grasp.seed)
+            return readings
+        skins = {finger: skin for finger, skin in self.skins.items() if isinstance(skin, Uskin)}
+        sensors = {finger: skin.sensor for finger, skin in skins.items()}
+        rest = {finger: skin.taxels.baseline for finger, skin in skins.items()}
+        return self.grasp.faults.apply(sensors, readings, times, rest, self.grasp.seed)
 
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
@@ -289,17 +316,18 @@ class Simulation:
         rule = LabelRule(margin=self._profile.label_margin, glitch=glitch)
         modules = {}
         read = {
-            finger: uskin.counts(taxel_forces[:, index], times, grasp.generator(f"skin {finger}"))
-            for index, (finger, uskin) in enumerate(self.uskins.items())
+            finger: skin.readout(grasp.generator(f"skin {finger}")).read(
+                taxel_forces[:, index], times
+            )
+            for index, (finger, skin) in enumerate(self.skins.items())
         }
-        read = self._with_faults(read, times)
-        for finger, uskin in self.uskins.items():
-            counts, stamps = read[finger], times
+        for finger, readings in self._with_faults(read, times).items():
+            stamps, sent = times, readings
             if grasp.server:
                 server = grasp.generator(f"server {finger}")
-                stamps, counts = with_server_effects(times, counts, server)
+                stamps, sent = with_server_effects(times, readings, server)
             labels = labels_from_truth(truth, finger, rule)
-            modules[finger] = Tactile(uskin.sensor, stamps, counts, labels=labels)
+            modules[finger] = Tactile(grasp.fingertip, stamps, sent, labels=labels)
         name = grasp.failed_name if self.protocol.failed else grasp.name
         metadata = _metadata(grasp, self.protocol)
         if self._profile.slips is not None:  # in the time of the recording
@@ -341,15 +369,15 @@ def simulate(
 
     Args:
         grasp: the grasp.
-        parameters: parameters of the skin; by default `UskinParameters()`.
+        parameters: parameters of a uSkin; by default `UskinParameters()`.
         on_sample: function that is called after each sample, for instance to draw a picture.
 
     Returns:
-        Recording of four fingertips in counts at 150 Hz. The metadata of a grasp that was never
+        Recording of four fingertips at 150 Hz. The metadata of a grasp that was never
         locked, or lost its object, have the case "failed".
 
     Raises:
-        ValueError: object, profile or case is unknown, or the object cannot be grasped.
+        ValueError: object, profile, case or sensor is unknown, or the object cannot be grasped.
     """
     simulation = Simulation(grasp, parameters)
     while not simulation.is_over:
@@ -405,10 +433,14 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
 
 
 @cache
-def _skin(seed: int, finger: str, parameters: UskinParameters, coupled: bool) -> Uskin:
+def _skin(
+    seed: int, finger: str, tip: Sensor, parameters: UskinParameters, coupled: bool
+) -> Uskin | ForceSkin:
     """Return the skin of a finger: one seed is one hand, with the same gains in all its grasps."""
     nodes = fingertip_of(coupled).nodes
-    return Uskin(parameters, sensor("uskin-curved"), nodes, generator_of(seed, f"skin/{finger}"))
+    if tip.name in FORCE_SENSORS:
+        return ForceSkin(tip, nodes)
+    return Uskin(parameters, tip, nodes, generator_of(seed, f"skin/{finger}"))
 
 
 def generator_of(seed: int, key: str) -> np.random.Generator:
@@ -438,6 +470,7 @@ def _metadata(grasp: Grasp, protocol: Protocol) -> dict[str, object]:
         "profile": grasp.profile,
         **({} if grasp.glitch_rate is None else {"glitch_rate": grasp.glitch_rate}),
         **({} if grasp.plant == MILD else {"plant": grasp.plant}),
+        **({} if grasp.sensor == USKIN else {"sensor": grasp.sensor}),
         "seed": grasp.seed,
         "server": grasp.server,
         "hand": "allegro-right",

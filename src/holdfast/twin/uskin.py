@@ -43,49 +43,17 @@ def taxel_shares(nodes: npt.ArrayLike, taxels: npt.ArrayLike, spread: float) -> 
     return shares
 
 
-class Uskin:
-    """One fingertip, with fixed gains, cross-talk, baselines and thermal behaviour of each taxel.
+class FingertipSkin:
+    """One fingertip, from the forces on the nodes of its skin to readings.
 
-    Attributes:
-        parameters: parameters of this kind of sensor.
+    Args:
         sensor: sensor with the poses of the taxels.
+        rotations: (n_taxels, 3, 3) from taxel frame to the twin's fingertip frame.
         shares: (n_nodes, n_taxels) shares of the taxels in the force on a node.
-        taxels: fixed properties of the taxels.
     """
 
-    def __init__(
-        self,
-        parameters: UskinParameters,
-        sensor: Sensor,
-        nodes: npt.ArrayLike,
-        generator: np.random.Generator,
-    ) -> None:
-        """Draw the properties of the taxels.
-
-        Args:
-            parameters: parameters of this kind of sensor.
-            sensor: sensor with the poses of the taxels.
-            nodes: (n_nodes, 3) nodes of the skin in the fingertip frame [m].
-            generator: random number generator; the same state gives the same sensor and counts.
-        """
-        self.parameters = parameters
-        self.sensor = sensor
-        self.shares = taxel_shares(nodes, sensor.positions, parameters.spread)
-        # The order of the draws is part of the seed; still taxels have a generator of their own, so
-        # that they leave it as it is. Gains have the median 1.
-        n = sensor.n_taxels
-        gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
-        axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
-        axes[:, range(3), range(3)] = 1.0
-        rest, warm = generator.standard_normal((2, n, 3))
-        still = generator.spawn(1)[0].random(n) < parameters.still_share
-        self.taxels = Taxels(
-            gains[:, None, None] * axes,
-            parameters.baseline + rest * parameters.baseline_spread,
-            parameters.thermal_counts + warm * parameters.thermal_spread,
-            np.where(still, 0.0, 1.0),
-        )
-        self._generator = generator
+    def __init__(self, sensor: Sensor, rotations: Array, shares: Array) -> None:
+        self.sensor, self.shares, self._rotations = sensor, shares, rotations
 
     def taxel_forces(self, node_forces: npt.ArrayLike) -> Array:
         """Compute the true force of each taxel in its own frame, positive when pressed.
@@ -110,9 +78,52 @@ class Uskin:
             )
         by_axis = forces.transpose(0, 2, 1).reshape(3 * len(forces), len(self.shares))
         on_taxels = (by_axis @ self.shares).reshape(len(forces), 3, self.sensor.n_taxels)
-        turned = on_taxels.transpose(2, 0, 1) @ -self.sensor.rotations  # taxel first
+        turned = on_taxels.transpose(2, 0, 1) @ -self._rotations  # taxel first
         result: Array = np.ascontiguousarray(turned.swapaxes(0, 1))
         return result
+
+
+class Uskin(FingertipSkin):
+    """Fingertip with fixed gains, cross-talk, baselines and thermal behaviour of each taxel.
+
+    Attributes:
+        parameters: parameters of this kind of sensor.
+        taxels: fixed properties of the taxels.
+    """
+
+    def __init__(
+        self,
+        parameters: UskinParameters,
+        sensor: Sensor,
+        nodes: npt.ArrayLike,
+        generator: np.random.Generator,
+    ) -> None:
+        """Draw the properties of the taxels.
+
+        Args:
+            parameters: parameters of this kind of sensor.
+            sensor: sensor with the poses of the taxels.
+            nodes: (n_nodes, 3) nodes of the skin in the fingertip frame [m].
+            generator: random number generator; the same state gives the same sensor and counts.
+        """
+        shares = taxel_shares(nodes, sensor.positions, parameters.spread)
+        super().__init__(sensor, sensor.rotations, shares)
+        self.parameters = parameters
+        # The order of the draws is part of the seed; still taxels have a generator of their own, so
+        # that they leave it as it is. Gains have the median 1.
+        n = sensor.n_taxels
+        gains = np.exp(parameters.gain_spread * generator.standard_normal(n))
+        axes = parameters.cross_talk * generator.standard_normal((n, 3, 3))
+        axes[:, range(3), range(3)] = 1.0
+        rest, warm = generator.standard_normal((2, n, 3))
+        still = generator.spawn(1)[0].random(n) < parameters.still_share
+        self.taxels = Taxels(
+            gains[:, None, None] * axes,
+            parameters.baseline + rest * parameters.baseline_spread,
+            parameters.thermal_counts + warm * parameters.thermal_spread,
+            np.where(still, 0.0, 1.0),
+        )
+        self._generator = generator
 
     def readout(self, generator: np.random.Generator | None = None) -> Readout:
         """Start a run of the sensor from rest, which takes samples in chunks of any size.
@@ -144,7 +155,7 @@ class Uskin:
             ValueError: the shapes do not agree, a force or time is not finite, or the times do
                 not increase.
         """
-        return self.readout(generator).counts(taxel_forces, times)
+        return self.readout(generator).read(taxel_forces, times)
 
 
 def last_updates(times: npt.ArrayLike, rate: float, phase: float) -> Integers:

@@ -266,7 +266,7 @@ class Readout:
             colour=np.zeros((2, len(taxels.baseline) * 3)),
         )
 
-    def counts(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
+    def read(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Counts:
         """Compute the next samples; arguments, result and errors are those of `Uskin.counts`."""
         forces, clock = self._checked(taxel_forces, times)
         counts = np.empty(forces.shape, dtype=np.uint16)

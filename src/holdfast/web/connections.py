@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import os
+import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -26,6 +27,9 @@ BACKLOG = 32
 """Connections that the system accepts before the server does."""
 LOG_INTERVAL = 10.0
 """Minimum time between two log lines of the same location in the code [s]."""
+
+_HOST = re.compile(r"(\[(?P<ipv6>[0-9A-Fa-f:.]+)]|(?P<name>[^]\s:/?#@[]*))(:[0-9]{1,5})?")
+"""Header `Host` of a request (RFC 3986, 3.2.2), without the forms that browsers do not send."""
 
 LOGGER = logging.getLogger("holdfast.web")
 
@@ -194,8 +198,11 @@ def refusal(host: str, origin: str | None, *, only_local: bool) -> str | None:
         >>> refusal("evil.example", None, only_local=True)
         "host 'evil.example' refused: this machine expected"
     """
-    name = host.partition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]
-    if only_local and not is_local(name):  # another name, though it leads here: DNS rebinding
+    parts = _HOST.fullmatch(host)
+    if parts is None:
+        return f"host {host!r} refused: NAME, NAME:PORT or [IPv6]:PORT expected"
+    # Another name, though it leads here: DNS rebinding.
+    if only_local and not is_local(parts["ipv6"] or parts["name"]):
         return f"host {host!r} refused: this machine expected"
     if origin is not None and origin.partition("://")[2] != host:
         return f"origin {origin!r} refused: {host!r} expected"

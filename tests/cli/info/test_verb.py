@@ -60,6 +60,16 @@ def test_json_of_a_recording(capsys, path, grasp):
     }  # fmt: skip
 
 
+def test_step_and_rest_are_shown_where_they_are_known(capsys, tmp_path):
+    readings = np.zeros((200, 87, 3))
+    thumb = Tactile(sensor("orca-finger"), np.arange(200) / 100, readings)
+    save_recording(Recording("made", {"thumb": thumb}), tmp_path / "made.parquet")
+    thumb = info_json(capsys, tmp_path / "made.parquet")["modules"]["thumb"]
+    assert (thumb["unit"], thumb["step"], thumb["rests_at_zero"]) == ("N", 0.1, True)
+    assert main(["info", str(tmp_path / "made.parquet")]) == 0
+    assert re.search(r"thumb +orca-finger +87 +0\.1 N ", capsys.readouterr().out)
+
+
 def test_gaps_repeats_and_faults(capsys, tmp_path):
     rng = np.random.default_rng(0)
     readings = rng.integers(100, 200, (300, 5, 3)).astype(float)

@@ -65,10 +65,10 @@ def test_no_hand_at_the_source_is_one_line(capsys, tmp_path, monkeypatch):
     assert "--camera" in err
     code, _, err = run(capsys, "teach", "xela:", "-o", "new.json", "--camera", "none.mp4")
     assert (code, "none.mp4" in err) == (2, True)
-    # Nothing is in the way of the next attempt.
     with pipe_of(monkeypatch, "quit\n"):
         code, _, err = run(capsys, "teach", "xela://127.0.0.1:1", "-o", "new.json")
     assert (code, err.splitlines()[-1]) == (2, "holdfast: not confirmed: nothing was recorded")
+    assert list(tmp_path.iterdir()) == []
 
 
 @contextmanager
@@ -148,8 +148,8 @@ def test_without_a_measured_slip_there_is_a_calibration_or_nothing(
 def test_what_was_carried_calibrates(tmp_path, capsys, name, options, why):
     folder = TeachingFolder(tmp_path / "grasps", resume=False)
     recording = handling_recording(0, held=36.0, **options)
-    save_recording(recording, folder.path / "001-carry.mcap")
     folder.save([GraspResult(name, 1, 30.0, True, "001-carry")])
+    save_recording(recording, folder.path / "001-carry.mcap")
     model = normalised_model()
     made, is_calibrated = verb.calibrated(model, folder)
     assert (is_calibrated, made == model) == (not why, bool(why))

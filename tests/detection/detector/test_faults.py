@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from holdfast.contact import STABLE, ContactState, Fault, Reason, n_mask_words
+from holdfast.contact import STABLE, ContactState, Fault, Reason
 from holdfast.detection import ANY_FINGER, Detector, Model, Tare, detect
 from holdfast.errors import ModelError
 from holdfast.exporters import header_of
+from holdfast.kernel.structs import n_mask_words
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.synthetic import synthetic_recording
 from holdfast.training import train

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from holdfast.contact import STABLE
 from holdfast.detection import ANY_FINGER, Debounce, Detector, FeatureSpec, Model, detect
-from holdfast.detection.model_files import decode, encode
+from holdfast.detection.model_files import decode
 from holdfast.errors import ModelError
 from holdfast.synthetic import synthetic_recording
 from holdfast.training.thresholds import ThresholdReplay
@@ -91,10 +91,10 @@ def test_after_a_long_time_the_past_is_forgotten():
 
 def test_old_models_keep_their_bytes():
     model = Model.load("builtin:twin")
-    assert b"switching" not in encode(model)
+    assert b"switching" not in model.encoded()
     assert model.debounce.switching_rate == 0.0
     steady = replace(model, debounce=Debounce(hold=0.1, switching=15.3))
-    assert decode(encode(steady), Model) == steady
+    assert decode(steady.encoded(), Model) == steady
 
 
 @pytest.mark.parametrize("value", [-1.0, math.inf, math.nan])

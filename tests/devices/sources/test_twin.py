@@ -73,6 +73,7 @@ def test_missing_parameters_have_defaults():
     assert grasp_of(parse("twin:")[1]) == Grasp("can", 2, 1, "reference", 0)
     text = "twin:?object=ball&case=1&repeat=7&profile=gentle&seed=9&server=true"
     assert grasp_of(parse(text)[1]) == Grasp("ball", 1, 7, "gentle", 9, server=True)
+    assert grasp_of(parse("twin:?sensor=orca-finger")[1]).sensor == "orca-finger"
 
 
 def test_a_grasp_that_fails_is_tried_again(quick):
@@ -178,6 +179,7 @@ def test_without_another_process_it_is_simulated_here(quick, monkeypatch):
         ("twin:?seed=-1", "'-1'"),
         ("twin:?seed=", "''"),
         ("twin:?server=yes", "'yes'"),
+        ("twin:?sensor=gtac", "'gtac'; there are uskin-curved, orca-finger"),
         ("twin:?attempt=2", "unknown parameter attempt; there are object"),
         ("twin:can", "twin:can"),
         ("twin://can", "twin://can"),

@@ -46,7 +46,13 @@ def test_the_number_of_taxels_decides_between_two_readings_of_a_header():
     first=st.integers(0, 1),
     n=st.integers(2, 30),
     form=st.sampled_from(
-        ["F{axis}{taxel}", "p{taxel}-{axis}", "mag_{axis}{taxel}", "{taxel} {axis}"]
+        [
+            "F{axis}{taxel}",
+            "p{taxel}-{axis}",
+            "mag_{axis}{taxel}",
+            "{taxel} {axis}",
+            "²{axis}{taxel}",
+        ]
     ),
 )
 def test_every_taxel_and_axis_is_found(first, n, form):

@@ -30,7 +30,10 @@ def test_a_missing_path(tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_an_empty_folder(tmp_path, name):
+def test_a_folder_without_a_file_of_the_format(tmp_path, name):
+    with pytest.raises(RecordingError, match="is empty"):
+        list(import_recordings(tmp_path, name))
+    (tmp_path / "a.txt").write_text("hello")
     with pytest.raises(RecordingError, match=r"^(no|.* has no) .* expected"):
         list(import_recordings(tmp_path, name))
 

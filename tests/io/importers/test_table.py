@@ -34,8 +34,9 @@ def test_whole_numbers_become_counts(values, number):
 
 
 def test_names_sort_as_a_person_would():
-    paths = [Path(name) for name in ("Exp10", "Exp2", "Exp1")]
-    assert [p.name for p in sorted(paths, key=natural_order)] == ["Exp1", "Exp2", "Exp10"]
+    ordered = ["5", "5²3.csv", "5²20.csv", "7" * 5000, "Exp1", "Exp2", "Exp10", "Exp²1"]
+    paths = [Path(name) for name in ordered[::-1]]
+    assert [p.name for p in sorted(paths, key=natural_order)] == ordered
 
 
 @pytest.mark.parametrize(

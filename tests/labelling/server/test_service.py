@@ -182,6 +182,7 @@ REFUSED = [
     (proposal(rule="tracking", parameters={"tracking": "/etc/passwd"}), 422, "'tracking'"),
     (proposal(parameters={"delay": 1.0}), 422, "delay"),
     (proposal(rule="command", parameters={"delay": "x"}), 422, ""),
+    *((proposal(parameters={"window": x}), 422, "window") for x in (1e18, 9e8, 0, [])),
     (proposal(rules="signal"), 422, "`rules`"),
     ((*PROPOSE[:2], b'{"parameters": {"delay": ' + b"[" * 100_000), 400, "/propose"),
     (("GET", "/api/v1/recordings/1"), 404, "1 given"),

@@ -1,7 +1,9 @@
 import json
 import time
+import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import pytest
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import labels_path, load_labels, load_recording, save_labels
+from holdfast.io.label_files import label_bytes
 from holdfast.labelling.server import store
 from holdfast.labelling.server.store import (
     ConflictError,
@@ -25,6 +28,7 @@ from holdfast.labelling.server.store import (
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
+from traps import traps
 
 from .build import NOW, made
 
@@ -58,7 +62,7 @@ def test_saved_labels_are_read_back(labelled):
     assert stored.labels == {"thumb": (replace(HELD, author="ada"), LOST), "index": ()}
     assert read_stored(path, recording) == stored
     assert (stored.author, stored.time, stored.note) == ("ada", NOW, "nice")
-    assert (stored.origin, stored.revision) == ("file", revision_of(path))
+    assert (stored.origin, stored.revision) == ("file", revision_of(label_bytes(path)))
     assert load_recording(path).modules["thumb"].labels == stored.labels["thumb"]
     assert load_recording(path).modules["index"].labels == ()
     assert load_labels(labels_path(path)).time == NOW
@@ -87,7 +91,7 @@ def test_an_old_revision_is_refused_and_nothing_is_written(bare):
     second = save(bare, {"thumb": [LOST]}, first.revision)
     with pytest.raises(ConflictError, match=r"bare\.labels\.json") as raised:
         save(bare, {"index": [HELD]}, first.revision)
-    assert raised.value.revision == second.revision == revision_of(path)
+    assert raised.value.revision == second.revision == revision_of(label_bytes(path))
     assert read_stored(path, recording) == second
     labels_path(path).unlink()
     with pytest.raises(ConflictError) as raised:
@@ -111,8 +115,17 @@ def test_a_label_file_of_another_recording(bare):
     with pytest.raises(RecordingError, match=text):
         read_stored(path, recording)
     with pytest.raises(RecordingError, match=text):
-        save(bare, {"thumb": [HELD]}, revision_of(path))
+        save(bare, {"thumb": [HELD]}, revision_of(label_bytes(path)))
     assert labels_path(path).read_bytes() == before
+
+
+@traps
+def test_no_label_file_is_read_or_replaced_but_a_file(bare, word, trap):
+    recording, path = bare
+    trap(labels_path(path))
+    for act in (lambda: read_stored(path, recording), lambda: save(bare, {"thumb": [HELD]})):
+        with pytest.raises(RecordingError, match=rf"bare\.labels\.json: it is a {word}"):
+            act()
 
 
 @pytest.mark.parametrize("content", [b"{", b'{"schema": "holdfast.labels/9"}'])
@@ -121,7 +134,7 @@ def test_a_damaged_label_file_is_left_alone(bare, content):
     labels_path(path).write_bytes(content)
     for read in (
         lambda: read_stored(path, recording),
-        lambda: save(bare, {"thumb": [HELD]}, revision_of(path)),
+        lambda: save(bare, {"thumb": [HELD]}, revision_of(label_bytes(path))),
     ):
         with pytest.raises(RecordingError, match=r"bare\.labels\.json"):
             read()
@@ -285,3 +298,20 @@ def test_labels_outside_the_recording_are_not_cut_but_refused(given):
     assert found == {"index": (label,)}
     with pytest.raises(ValueError, match=r"^index: label .* lies outside the recording"):
         validated(uneven(), found)
+
+
+def test_memory_of_many_labels(bare):
+    """A label that is saved takes less than 900 bytes, in all its forms together."""
+    recording, path = bare
+    edges = np.linspace(recording.start, recording.end, 20_001).tolist()
+    inputs = {"thumb": [LabelInput(*span, "stable") for span in pairwise(edges)]}
+    revision = "none"
+    for _ in range(2):
+        tracemalloc.start()
+        labels = cut_to_samples(recording, parse_labels(inputs))
+        revision = save_stored(
+            path, recording, labels, revision=revision, author="ada", time=NOW
+        ).revision
+        _, peak = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert peak < 900 * 20_000

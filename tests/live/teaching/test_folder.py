@@ -5,6 +5,7 @@ import pytest
 from holdfast.errors import OutputError, RecordingError
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import GraspResult
+from traps import traps
 
 HOLD = GraspResult("hold", 1, 9.5, True, "001-hold", "held for 9 s")
 REPEATED = GraspResult("pull", 1, 9.5, False, "002-pull", "no slide seen")
@@ -13,6 +14,8 @@ REPEATED = GraspResult("pull", 1, 9.5, False, "002-pull", "no slide seen")
 def test_results_are_kept_and_a_protocol_is_resumed(tmp_path):
     path = tmp_path / "grasps"
     folder = TeachingFolder(path, resume=False)
+    assert not path.exists()
+    folder.save([])
     assert folder.new_path("hold") == path / "001-hold.mcap"
     for name in ("001-hold.mcap", "002-pull.mcap", "002-pull.mp4", "002-pull.labels.json"):
         (path / name).write_text(name)
@@ -48,7 +51,14 @@ def test_results_that_cannot_be_read_are_an_error(tmp_path, content):
         TeachingFolder(tmp_path, resume=True)
 
 
+@traps
+def test_no_journal_is_read_but_a_file(tmp_path, word, trap):
+    trap(tmp_path / "teach.json")
+    with pytest.raises((OutputError, RecordingError), match=rf"it is a {word}|has no teach\.json"):
+        TeachingFolder(tmp_path, resume=True)
+
+
 def test_a_folder_that_cannot_be_made_is_an_error(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="file/grasps"):
-        TeachingFolder(tmp_path / "file" / "grasps", resume=False)
+        TeachingFolder(tmp_path / "file" / "grasps", resume=False).save([])

@@ -62,7 +62,7 @@ class LiveTwin(Source, HandDevice):
         """Sensors by finger."""
         if self.simulation is None:
             return {}
-        return {finger: uskin.sensor for finger, uskin in self.simulation.uskins.items()}
+        return {finger: skin.sensor for finger, skin in self.simulation.skins.items()}
 
     @property
     def metadata(self) -> Mapping[str, Any]:  # type: ignore[override]

@@ -34,7 +34,7 @@ def doctor(
     processor, memory), the plug-ins of other packages, and the folder in HOLDFAST_DATA. The
     exit code is always 0.
 
-    With SOURCE, read ten seconds of the open hand, which nothing touches, and report for each
+    With SOURCE, read ten seconds of the open hand, up to the first touch, and report for each
     module the rate, the jitter, the gaps, the noise by axis and of the loudest taxel, dead and
     stuck taxels, zeros, the range, and the magnetic field, if you turn the hand. The check is
     kept, and compared with the last one.
@@ -68,7 +68,8 @@ def check_modules(
         as_json: print JSON.
 
     Raises:
-        SourceError: too few samples arrive, something touches a module, or the file is no history.
+        SourceError: too few samples arrive, a module is touched from the start, or the file is no
+            history.
     """
     from msgspec import to_builtins
 

@@ -56,8 +56,9 @@ def _print_modules(modules: Mapping[str, Mapping[str, Any]]) -> None:
     print_table(
         header,
         [
-            (name, m["sensor"], m["n_taxels"], m["unit"], m["n_samples"], f"{m['rate']:.1f}",
-             m["gaps"], m["repeats"])
+            (name, m["sensor"], m["n_taxels"],
+             f"{m['step']:g} {m['unit']}" if "step" in m else m["unit"],
+             m["n_samples"], f"{m['rate']:.1f}", m["gaps"], m["repeats"])
             for name, m in modules.items()
         ],
     )  # fmt: skip

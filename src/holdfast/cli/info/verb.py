@@ -58,8 +58,8 @@ def info(
     if model is not None and figure.plot is None:
         raise ValueError("--model is for the figure; --plot FILE expected beside it")
     if kind == "model":
+        from holdfast.cli.info.model_facts import facts_of
         from holdfast.detection import Model
-        from holdfast.detection.model_files import facts_of
 
         facts = facts_of(Model.load(path))
         print_json(facts) if as_json else print_model(facts, path.name)

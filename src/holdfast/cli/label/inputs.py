@@ -91,7 +91,7 @@ class RuleOptions:
             if self.tracks and (self.poses is not None or self.video is None):
                 raise ValueError(
                     "--track names topics or frames of a bag: give --poses BAG (or stickers of a "
-                    "video: give --video FILE)"
+                    "video: `holdfast label auto tracking` has --video FILE)"
                 )
             return None if self.poses is None else poses_from_csv(self.poses)
         names = dict(_pair(text, "--track BODY=NAME") for text in self.tracks or ())

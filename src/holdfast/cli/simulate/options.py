@@ -45,6 +45,14 @@ class GraspOptions:
         ),
         RARE,
     ] = False
+    sensor: Annotated[
+        str,
+        typer.Option(
+            help="Sensor of the fingertips: uskin-curved (counts, noisy) or orca-finger, "
+            "orca-thumb, orca-pinky (steps of 0.1 N, exact zeros without contact)."
+        ),
+        RARE,
+    ] = "uskin-curved"
     faults: Annotated[
         str,
         typer.Option(
@@ -58,12 +66,12 @@ class GraspOptions:
         """Return the grasps of an Allegro hand.
 
         Raises:
-            ValueError: an unknown object, case, profile or fault, or a number out of range.
+            ValueError: an unknown object, case, profile, fault or sensor, or a number out of range.
         """
         from holdfast.simulated_grasps import plan_grasps
 
         table = None if self.table is None else engine.path(self.table)
         return plan_grasps(
             self.objects, self.cases, self.repeats, self.profile, self.seed,
-            server=self.server, table=table, faults=self.faults,
+            server=self.server, table=table, faults=self.faults, sensor=self.sensor,
         )  # fmt: skip

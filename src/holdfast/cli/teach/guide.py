@@ -110,6 +110,7 @@ class Guide:
             OutputError: a recording cannot be written.
         """
         protocol = self.protocol
+        self._folder.save(self._folder.results)  # a break in the first grasp can be resumed too
         try:
             with ExitStack() as stack:
                 stack.enter_context(screen)

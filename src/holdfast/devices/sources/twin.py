@@ -20,7 +20,7 @@ from holdfast.twin.magnetic_faults import MagneticFaults
 from holdfast.twin.objects import load_objects
 from holdfast.twin.profile import GRASP_ATTEMPTS, profile
 from holdfast.twin.scripted import perform
-from holdfast.twin.simulation import GRASP_CASES, Grasp, simulate
+from holdfast.twin.simulation import GRASP_CASES, USKIN, Grasp, simulate
 
 OPEN_SECONDS = 3.0
 """Time with an open hand with which a twin that is taught begins [s]: room for the tare."""
@@ -40,13 +40,13 @@ class Twin(Player):
     repeat of the grasp while this one plays.
 
     Args:
-        address: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference&server=false`;
-            missing parameters have these values.
+        address: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference&server=false` and
+            `&sensor=uskin-curved`; missing parameters have these values.
         speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
         loop: play the next repeat of the grasp at the end.
 
     Raises:
-        ValueError: there is no such object, profile or case, or a parameter is not valid.
+        ValueError: there is no such object, profile, case or sensor, or a parameter is not valid.
     """
 
     def __init__(self, address: Address, *, speed: float = 1.0, loop: bool = False) -> None:
@@ -196,14 +196,14 @@ def grasp_of(address: Address) -> Grasp:
     """Return the grasp of a URI.
 
     Raises:
-        ValueError: there is no such object, profile or case, or a parameter is not valid.
+        ValueError: there is no such object, profile, case or sensor, or a parameter is not valid.
 
     Example:
         >>> from holdfast.devices.uri import parse
         >>> grasp_of(parse("twin:?object=ball&repeat=3")[1]).name
         'ball-case2-3'
     """
-    address.only("object", "seed", "case", "repeat", "profile", "server")
+    address.only("object", "seed", "case", "repeat", "profile", "server", "sensor")
     if address.host or address.path:
         raise ValueError(f"{address.text}: twin:?object=can&seed=1 expected, without a path")
     given = address.parameters
@@ -214,10 +214,11 @@ def grasp_of(address: Address) -> Grasp:
         given.get("profile", "reference"),
         _integer(address, "seed", 0),
         server=_boolean(address, "server"),
+        sensor=given.get("sensor", USKIN),
     )
     try:
         profile(grasp.profile)
-        grasp.item  # noqa: B018 (refuses an unknown object)
+        grasp.item, grasp.fingertip  # noqa: B018 (refuses an unknown object or sensor)
     except ValueError as cause:
         raise ValueError(f"{address.text}: {cause}") from cause
     if grasp.case not in GRASP_CASES or grasp.repeat < 1:

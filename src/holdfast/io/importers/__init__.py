@@ -30,14 +30,15 @@ FORMATS = {
 }
 """Formats that can be imported, with a description; they are detected in this order, those of
 plug-ins after the first."""
-IN_CONTACT = (
-    "the object is held from the first sample on (metadata: starts_loaded); where a verb does not "
-    "read this, give --in-contact"
+IN_CONTACT = "the object is held from the first sample on (metadata: starts_loaded)"
+IF_IN_CONTACT = (
+    "if the hand already holds the object at the first sample, use `holdfast detect --in-contact`, "
+    "and so in other verbs"
 )
-IF_IN_CONTACT = "if the hand already holds the object at the first sample, give --in-contact"
 IF_Z_FALLS = f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--"
 HINTS = {"xela-log": IF_IN_CONTACT, "csv": IF_Z_FALLS, "arrays": IF_Z_FALLS}
-"""Option that helps with the recordings of a format, for the person who imports them."""
+"""Advice about the recordings of a format, for the person who imports them. Options are those of
+`import`, unless another verb is named."""
 
 
 def import_recordings(
@@ -176,7 +177,10 @@ def _format_of(
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
-        for file in [path] if path.is_file() else sorted(path.iterdir()):
+        files = [path] if path.is_file() else sorted(path.iterdir())
+        if not files:
+            raise RecordingError(f"{path} is empty; a file or folder to import expected")
+        for file in files:
             if is_lfs_pointer(file):  # the clone was made without the data
                 raise RecordingError(refusal_of_lfs_pointer(file))
         if name is not None or not (sensors or columns):

@@ -329,7 +329,7 @@ def _patterns(name: str) -> Iterator[tuple[str, tuple[int, str]]]:
     if len(name) > MAX_GUESSED_NAME:
         return
     tokens = _TOKEN.findall(name)
-    numbers = [k for k, token in enumerate(tokens) if token.isdigit()]
+    numbers = [k for k, token in enumerate(tokens) if token.isdecimal()]
     for k, token in enumerate(tokens):
         if token[-1].lower() not in "xyz":
             continue

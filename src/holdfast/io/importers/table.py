@@ -319,7 +319,9 @@ def errors_named(source: object) -> Iterator[None]:
 
 def natural_order(path: Path) -> list[str | int]:
     """Return a sort key for file names with numbers: Exp2 before Exp10."""
-    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", path.name)]
+    # Every second part is a number. Of more than 640 digits, Python may refuse to make an `int`.
+    parts = re.split(r"(\d{1,640})", path.name)
+    return [int(part) if k % 2 else part for k, part in enumerate(parts)]
 
 
 def read_head(path: Path) -> TableHead:

@@ -58,6 +58,8 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
                 "sensor": module.sensor.name,
                 "n_taxels": module.sensor.n_taxels,
                 "unit": module.sensor.unit,
+                **({} if module.sensor.step is None else {"step": module.sensor.step}),
+                **({"rests_at_zero": True} if module.sensor.rests_at_zero else {}),
                 "n_samples": module.force.n_samples,
                 "rate": module.force.rate,
                 "gaps": module.force.n_gaps,

@@ -14,7 +14,7 @@ import numpy as np
 from holdfast.contact import MAX_TAXELS
 from holdfast.detection import EXACT_RATE, RELATIVE_RATES
 from holdfast.errors import HoldfastError
-from holdfast.io.label_files import labels_path, load_labels
+from holdfast.io.label_files import decode_labels, label_bytes, labels_path
 from holdfast.labelling.review.scan import FindingsScan, ModuleScan
 from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
@@ -93,8 +93,8 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         for each in scan.alike
     ]
     if reason := evidence_of_contact(scan.recording):
-        text = f"begins in contact ({reason}): the first samples are load (give --in-contact); or "
-        text += "z of the sensor points inwards (docs/sensors.md)"
+        text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
+        text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
     with suppress(HoldfastError):  # no sample for the tare
         if not hand_force(scan.recording).n_touching.any():
@@ -135,10 +135,10 @@ def hidden_labels(path: Path) -> Finding | None:
     Raises:
         RecordingError: the recording or its label file cannot be read.
     """
-    beside = labels_path(path)
-    if not beside.exists():
+    beside, data = labels_path(path), label_bytes(path)
+    if data is None:
         return None
-    file = load_labels(beside)
+    file = decode_labels(data, beside)
     authors = [file.author, *(each.author for own in file.modules.values() for each in own)]
     rule = next((author for author in authors if author.startswith("rule:")), None)
     if rule is None or not (n_inside := summary_of(path).n_inside):

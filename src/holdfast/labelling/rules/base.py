@@ -1,6 +1,5 @@
 """Parts that all rules share: states over time, the labels made from them, checks of parameters."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any, Self
@@ -14,6 +13,8 @@ from holdfast.metrics.masks import Mask
 from holdfast.recordings import Label
 from holdfast.sensors.types import Array
 
+MAX_NUMBER = 1e9
+"""Largest number of a threshold; above, a number of samples does not fit into 64 bits."""
 CONFIDENCE_TIME = 0.2
 """Duration at which a label keeps 63 % of its confidence [s]."""
 
@@ -145,7 +146,7 @@ def label_confidence(ratio: float, duration: float) -> float:
 
 
 def check_positive(parameters: Any) -> None:  # noqa: ANN401 (any dataclass)
-    """Check that all fields of a dataclass are finite numbers above 0, or text.
+    """Check that all fields of a dataclass are numbers above 0, up to `MAX_NUMBER`, or text.
 
     Raises:
         ValueError: a field is not.
@@ -154,5 +155,7 @@ def check_positive(parameters: Any) -> None:  # noqa: ANN401 (any dataclass)
         value = getattr(parameters, field.name)
         if isinstance(value, str):
             continue
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0):
-            raise ValueError(f"{field.name}: a number above 0 expected, {value!r} given")
+        if not (isinstance(value, int | float) and 0 < value <= MAX_NUMBER):
+            raise ValueError(
+                f"{field.name}: a number above 0 expected, up to {MAX_NUMBER:g}; {value!r} given"
+            )

@@ -94,9 +94,14 @@ def propose(
 
     Raises:
         RecordingError: no sample for the tare.
-        ValueError: the tare is unknown.
+        ValueError: the tare is unknown, or the window is longer than the recording.
     """
     rule = rule or SignalRule()
+    # A filter takes memory for its window, however short the recording is.
+    if rule.window > (longest := max(recording.duration, SignalRule.window)):
+        raise ValueError(
+            f"window: up to {longest:g} s expected, the recording; {rule.window:g} given"
+        )
     hand = hand_force(recording, tare)
     change = {name: _change_ratio(finger, rule) for name, finger in hand.fingers.items()}
     # A change of two fingers is one of the object, and so of every finger that touches it.

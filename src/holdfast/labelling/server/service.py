@@ -27,7 +27,8 @@ from holdfast.web.body import BodyReader, json_error
 from holdfast.web.guard import Guard, Handler
 
 MAX_REQUEST_BYTES = 64 << 20
-"""Largest request of a page, which sends all labels of a recording [bytes]."""
+"""Largest request of a page, which sends all labels of a recording: some 500,000 [bytes]. To save
+them takes up to eight times as much memory."""
 MAX_PENDING_BYTES = 2 * MAX_REQUEST_BYTES
 """Largest sum of all requests that have not arrived completely [bytes]."""
 

@@ -21,12 +21,16 @@ from holdfast.files import lock, sync, write_whole
 from holdfast.io.header import label_data
 from holdfast.io.label_files import (
     LabelFile,
+    LabelOwner,
+    check_owner,
+    decode_file,
+    decode_labels,
     encode_labels,
-    labels_for,
+    label_bytes,
+    labels_of,
     labels_path,
-    load_labels,
 )
-from holdfast.recordings import Label, Recording
+from holdfast.recordings import Label, Recording, cut_labels
 
 NO_REVISION = "none"
 """Revision of a label file that does not exist."""
@@ -119,17 +123,16 @@ def read_stored(path: Path, recording: Recording) -> StoredLabels:
     Raises:
         RecordingError: the label file is damaged, of another recording, or does not fit it.
     """
-    revision = revision_of(path)
-    beside = labels_for(path, recording.digest)
-    if beside is None:
+    data = label_bytes(path)
+    if data is None:
         inside = {name: module.labels for name, module in recording.modules.items()}
-        return StoredLabels(inside, "inside" if any(inside.values()) else "none", revision)
-    file = load_labels(labels_path(path))
+        return StoredLabels(inside, "inside" if any(inside.values()) else "none", NO_REVISION)
+    file = decode_labels(data, labels_path(path))
     try:
-        labels = validated(recording, beside)
+        labels = validated(recording, labels_of(file, path, recording.digest))
     except ValueError as cause:
         raise RecordingError(f"{labels_path(path)}: {cause}") from cause
-    return StoredLabels(labels, "file", revision, file.author, file.time, file.notes)
+    return StoredLabels(labels, "file", revision_of(data), file.author, file.time, file.notes)
 
 
 def save_stored(
@@ -166,44 +169,38 @@ def save_stored(
         name: tuple(label if label.author else replace(label, author=author) for label in valid)
         for name, valid in validated(recording, labels).items()
     }
-    file = LabelFile(
-        recording=recording.digest,
-        name=recording.name,
-        modules={name: [label_data(label) for label in done] for name, done in signed.items()},
-        author=author,
-        time=time,
-        notes=note,
+    # Of half a million labels, no form is kept longer than until the next one is made.
+    data = encode_labels(
+        LabelFile(
+            recording=recording.digest,
+            name=recording.name,
+            modules={name: [label_data(label) for label in done] for name, done in signed.items()},
+            author=author,
+            time=time,
+            notes=note,
+        )
     )
-    data = encode_labels(file)
     target = labels_path(path)
     if is_read_only(path):
         raise ReadOnlyError(f"{target} cannot be written: it or its folder is read-only")
     # The revision is compared and the file replaced under one lock, so that two saves of the same
     # revision never both succeed.
     with _locked(target.parent):
-        current = revision_of(path)
-        if current != revision:
+        before = label_bytes(path)
+        if (current := revision_of(before)) != revision:
             raise ConflictError(
                 f"{target.name} was changed by another program since it was read", current
             )
-        labels_for(path, recording.digest)  # raises if the file is not this recording's
+        if before is not None:  # raises if the file is not this recording's
+            check_owner(decode_file(before, target, LabelOwner), path, recording.digest)
         write_whole(target, data, force=True)
         sync(target, target.parent)
-        return StoredLabels(signed, "file", revision_of(path), author, time, note)
+        return StoredLabels(signed, "file", revision_of(data), author, time, note)
 
 
-def revision_of(path: Path) -> str:
-    """Return the revision of the label file of the recording at `path`.
-
-    Raises:
-        RecordingError: it cannot be read.
-    """
-    try:
-        return hashlib.blake2b(labels_path(path).read_bytes(), digest_size=12).hexdigest()
-    except FileNotFoundError:
-        return NO_REVISION
-    except OSError as cause:
-        raise RecordingError(f"cannot read {labels_path(path)}: {cause.strerror}") from cause
+def revision_of(data: bytes | None) -> str:
+    """Return the revision of the content of a label file, from `label_bytes`."""
+    return NO_REVISION if data is None else hashlib.blake2b(data, digest_size=12).hexdigest()
 
 
 def is_read_only(path: Path) -> bool:
@@ -276,17 +273,12 @@ def cut_to_samples(recording: Recording, labels: ModuleLabels) -> dict[str, tupl
     end = recording.end + max(module.period for module in recording.modules.values())
     cut: dict[str, tuple[Label, ...]] = {}
     for finger, uncut in labels.items():
-        module, kept = recording.modules.get(finger), []
-        for label in uncut:
-            if module is None or not module.n_samples:
-                kept.append(label)
-            elif start <= label.start and label.end <= end + TIME_TOLERANCE:
-                begins = max(label.start, float(module.times[0]))
-                ends = min(label.end, float(module.times[-1]) + module.period)
-                kept += [replace(label, start=begins, end=ends)] if begins < ends else []
-            else:
-                kept.append(label)
-        cut[finger] = tuple(kept)
+        module = recording.modules.get(finger)
+        is_inside = all(start <= x.start and x.end <= end + TIME_TOLERANCE for x in uncut)
+        if module is not None and module.n_samples and is_inside:
+            cut[finger] = cut_labels(uncut, module)
+        else:  # `validated` rejects them
+            cut[finger] = tuple(uncut)
     return cut
 
 

@@ -6,13 +6,15 @@ from pathlib import Path
 import msgspec
 
 from holdfast.errors import OutputError, RecordingError
-from holdfast.files import write_whole
+from holdfast.files import read_input, write_whole
 from holdfast.io.label_files import labels_path
 from holdfast.io.stickers import stamps_path
 from holdfast.live.teaching.protocol import GraspResult
 
 JOURNAL = "teach.json"
 """Name of the file with the results of all grasps."""
+MAX_JOURNAL = 1 << 20
+"""Largest file of results [bytes]; 999 grasps take 200 kB."""
 ASIDE = "left-out"
 """Name of the folder inside, of grasps that were repeated or skipped: they teach nothing."""
 
@@ -21,7 +23,7 @@ class TeachingFolder:
     """Folder of a protocol. Each result is written at once, so that a break loses nothing.
 
     Args:
-        path: of the folder; it is created.
+        path: of the folder; the first `save` creates it.
         resume: go on with the protocol of the folder.
 
     Attributes:
@@ -49,7 +51,6 @@ class TeachingFolder:
             raise OutputError(f"{path} has no {JOURNAL} and is not empty: another folder expected")
         elif resume:
             raise RecordingError(f"{path} has no {JOURNAL}: there is nothing to resume")
-        self._write()
 
     @property
     def kept(self) -> list[GraspResult]:
@@ -68,7 +69,11 @@ class TeachingFolder:
         for result in self.results:
             if result.recording and not result.kept:
                 self.leave_out(self.path / f"{result.recording}.mcap")
-        self._write()
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except OSError as cause:
+            raise OutputError(f"cannot write to {self.path}: {cause.strerror}") from cause
+        write_whole(self._journal, msgspec.json.encode(self.results), force=True)
 
     def leave_out(self, path: Path) -> None:
         """Move a recording, its labels and its video aside."""
@@ -82,15 +87,9 @@ class TeachingFolder:
 
     def _read(self) -> list[GraspResult]:
         try:
-            return msgspec.json.decode(self._journal.read_bytes(), type=list[GraspResult])
+            return msgspec.json.decode(
+                read_input(self._journal, MAX_JOURNAL, follow=False), type=list[GraspResult]
+            )
         except (OSError, ValueError) as cause:
-            raise RecordingError(
-                f"{self._journal} has no results of a protocol: {cause}"
-            ) from cause
-
-    def _write(self) -> None:
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except OSError as cause:
-            raise OutputError(f"cannot write to {self.path}: {cause.strerror}") from cause
-        write_whole(self._journal, msgspec.json.encode(self.results), force=True)
+            why = cause.strerror if isinstance(cause, OSError) else cause
+            raise RecordingError(f"{self._journal} has no results of a protocol: {why}") from cause

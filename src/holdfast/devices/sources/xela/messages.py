@@ -14,11 +14,12 @@ import numpy.typing as npt
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.packet import InvalidPacket, read_packet
 from holdfast.errors import RecordingError, SourceError
+from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.io.importers.table import natural_order
 from holdfast.recordings import Recording, Tactile
 
 LOG_SUFFIXES = (".jsonl", ".json", ".log", ".txt")
-HINT = "if the hand already holds the object at the first sample, give --in-contact"
+HINT = IF_IN_CONTACT
 MAX_MESSAGE_LENGTH = 1 << 20
 """Longest line that is read [characters]; a whole hand sends 20,000."""
 MAX_LINES_BEFORE = 100
