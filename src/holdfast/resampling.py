@@ -95,8 +95,8 @@ def held_rows(readings: Array, sensor: Sensor, rate: float) -> float | None:
 
 
 def skips_zeros(sensor: Sensor) -> bool:
-    """Return whether zeros of all taxels are no reading of a sensor: GTac rests at them."""
-    return not (sensor.rests_at_zero or sensor.name == "gtac")
+    """Return whether zeros of all taxels are no reading of a sensor."""
+    return not sensor.rests_at_zero
 
 
 class UpdateFilter:

@@ -62,7 +62,6 @@ def one_module(indices):
         ({"step": "0.1"}, "pair: a step above 0"),
         ({"step": 2.0, "range": (0, 1)}, "pair: a step within the range of 0 to 1 expected, 2"),
         ({"rests_at_zero": 1}, "pair: rests_at_zero true or false expected, 1 given"),
-        ({"rests_at_zero": None}, "pair: rests_at_zero true"),
         ({"rests_at_zero": True, "range": (1, 9)}, "pair: .* has zero in its range, 1 to 9 given"),
     ],
 )
@@ -153,6 +152,13 @@ class TestFromJson:
     def test_a_range_under_both_names_is_refused(self, tmp_path):
         with pytest.raises(ValueError, match="limits"):
             Sensor.from_json(written(tmp_path, range=[0, 1], limits=[0, 4095]))
+
+    def test_gtac_rests_at_zero_by_its_name(self):
+        gtac = sensor("gtac")
+        assert gtac.rests_at_zero
+        assert "rests_at_zero" not in gtac.to_dict()
+        assert Sensor.from_dict(gtac.to_dict()) == gtac
+        assert not Sensor.from_dict(gtac.to_dict() | {"rests_at_zero": False}).rests_at_zero
 
     def test_what_is_magnetic_is_known_by_the_name_of_a_built_in_sensor(self, tmp_path):
         plain, magnetic = (

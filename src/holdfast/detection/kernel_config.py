@@ -11,7 +11,6 @@ from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import Structs, structs
-from holdfast.resampling import skips_zeros
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
@@ -176,7 +175,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
         "is_magnetic": bool(sensor.magnetic),
-        "rests_at_zero": not skips_zeros(sensor),
+        "rests_at_zero": bool(sensor.rests_at_zero),
         # The load of the start, when it goes, may look like a field.
         "max_field": MAX_EARTH_FIELDS.get(sensor.name, np.inf)
         if sensor.magnetic and not plan.zero_unknown

@@ -89,10 +89,10 @@ HF_API int32_t holdfast_detect(
         int contact = HF_IN_CONTACT;
         if (present[i] && f.values->reason == HOLDFAST_READY) {
             contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
-            if (!f.state->is_alive && contact != HF_WITHOUT_CONTACT &&
-                f.values->reason == HOLDFAST_READY) {
-                f.values->reason = HOLDFAST_WARM_UP; /* constants prove no contact */
-            }
+        }
+        if (!f.state->is_alive && contact != HF_WITHOUT_CONTACT &&
+            f.values->reason == HOLDFAST_READY) {
+            f.values->reason = HOLDFAST_WARM_UP; /* constants prove no contact */
         }
         /* After the contact: it may report a drift of the tare, a fault. */
         if (f.values->reason != HOLDFAST_READY) {

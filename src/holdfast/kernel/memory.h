@@ -90,8 +90,6 @@ typedef struct {
     hf_real max_amplitude; /* largest F_a so far, of samples without a fault of HF_SERIOUS */
     int64_t n_pulled;      /* successive samples whose normal readings add up to a pull */
     /* Changes and faulty taxels (faults.c). */
-    int64_t n_constant;    /* samples before the first that changed a reading */
-    hf_real constant_sum;  /* weighted sum of their readings, see hf_scan */
     int64_t n_unchanged;   /* samples since the readings last changed */
     int64_t n_changes;     /* samples that changed the readings */
     int64_t longest_rest;  /* most samples without a change, if long and not by a fault */
@@ -135,6 +133,9 @@ typedef struct {
     uint64_t ring_age;         /* samples since the ring is followed */
     bool ring_varies;          /* enough readings and samples of the ring differ */
     holdfast_motion motion;
+    /* Readings that never changed (faults.c): last, as a living finger does not read it. */
+    int64_t n_constant;   /* samples before the first that changed a reading */
+    hf_real constant_sum; /* weighted sum of their readings, see hf_scan */
 } holdfast_finger_memory;
 
 /* Result of a finger at its last sample; NaN where there is none. */

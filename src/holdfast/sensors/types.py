@@ -28,6 +28,9 @@ MAGNETIC_SENSORS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin")
 
 The sections of `gtac` lie on different fingers, and half of what they read is no field."""
 
+RESTING_SENSORS = ("gtac",)
+"""Built-in sensors that rest at exact zero. Files do not repeat it for them."""
+
 ROTATION_TOLERANCE = 1e-5
 """Maximum error of a rotation matrix as read; tables are rounded to six digits."""
 
@@ -60,7 +63,8 @@ class Sensor:
         magnetic: whether each taxel is a magnetometer, which also reads the earth's field. None
             stands for what is known by the name: True for the built-in `uskin-*` and `anyskin`.
         step: smallest change of a reading [unit]; None if unknown.
-        rests_at_zero: whether every reading is exactly zero without contact.
+        rests_at_zero: whether every reading is exactly zero without contact. None takes what the
+            name of a built-in sensor says, false for any other.
 
     Raises:
         ValueError: a shape is wrong, a number is not finite, a rotation is not valid, or the range
@@ -76,7 +80,7 @@ class Sensor:
     range: tuple[float, float] | None = None
     magnetic: bool | None = None
     step: float | None = None
-    rests_at_zero: bool = False
+    rests_at_zero: bool | None = None
 
     def __post_init__(self) -> None:
         if not self.name:
@@ -133,6 +137,8 @@ class Sensor:
                     f"{self.step:g} given"
                 )
             object.__setattr__(self, "step", float(self.step))
+        if self.rests_at_zero is None:
+            object.__setattr__(self, "rests_at_zero", self.name in RESTING_SENSORS)
         if not isinstance(self.rests_at_zero, bool):
             raise ValueError(
                 f"{self.name}: rests_at_zero true or false expected, {self.rests_at_zero!r} given"
@@ -192,8 +198,8 @@ class Sensor:
             fields["magnetic"] = self.magnetic
         if self.step is not None:
             fields["step"] = self.step
-        if self.rests_at_zero:
-            fields["rests_at_zero"] = True
+        if self.rests_at_zero != (self.name in RESTING_SENSORS):
+            fields["rests_at_zero"] = self.rests_at_zero
         return fields
 
     @classmethod
@@ -222,7 +228,7 @@ class Sensor:
             range=data.get("range"),
             magnetic=data.get("magnetic"),
             step=data.get("step"),
-            rests_at_zero=data.get("rests_at_zero", False),
+            rests_at_zero=data.get("rests_at_zero"),
         )
 
     @classmethod

@@ -20,11 +20,6 @@ N_DEAD = 50
 """Samples of half a second."""
 
 
-def resting(which):
-    object.__setattr__(which, "rests_at_zero", True)
-    return which
-
-
 def estimates(which=TIP, tare="0.2", **fingers):
     """Return the estimates of a hand, which are those of the naive detector too."""
     hand_model, sensors = by_force(tare=tare), dict.fromkeys(fingers, which)
@@ -86,7 +81,7 @@ def test_the_rule_of_the_kernel_is_that_of_python():
 
 @pytest.mark.parametrize(("value", "is_dead"), [(0.0, False), (7.0, True)])
 def test_a_sensor_that_rests_at_zero_is_dead_at_other_constants_alone(value, is_dead):
-    which = resting(replace(TIP, range=None))
+    which = replace(TIP, range=None, rests_at_zero=True)
     found = estimates(which, thumb=np.full((100, 6, 3), value))
     assert found[-1].fingers["thumb"].is_dead == is_dead
     assert found[-1].state is (UNKNOWN if is_dead else NO_CONTACT)
