@@ -368,7 +368,7 @@ class Recording:
     def blocks(self) -> Digests:
         """Digests of the blocks of all modules, in order of time: parts of it have some of them.
 
-        Times, labels and names of modules do not count ([blocks][holdfast.blocks]).
+        Times, labels and names of modules do not count, see `holdfast.blocks`.
         """
         modules = [module_blocks(module.readings) for module in self.modules.values()]
         shares = [np.arange(len(blocks)) / max(len(blocks), 1) for blocks in modules]
