@@ -69,7 +69,7 @@ def test_a_folder_may_have_the_name_of_a_command_that_was_removed(
 ):
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).mkdir()
-    assert refusal(capsys, name).startswith(f"no recording in {name} ")
+    assert refusal(capsys, name).startswith(f"{name} is empty")
 
 
 def test_a_sheet_of_markers(capsys, tmp_path):
