@@ -76,10 +76,10 @@ def held_rows(readings: Array, sensor: Sensor, rate: float) -> float | None:
         None if no reading changes.
     """
     rows = np.arange(len(readings))
-    if skips_zeros(sensor):
+    if not sensor.rests_at_zero:
         rows = np.maximum.accumulate(np.where(readings.any(axis=(1, 2)), rows, 0))
     newer, older = readings[rows[1:]], readings[rows[:-1]]
-    differ = ((newer != older) & ~(np.isnan(newer) & np.isnan(older))).any(axis=2)
+    differ = differing_taxels(newer, older)
     changed = differ.any(axis=1)
     if not changed.any():
         return None
@@ -94,9 +94,10 @@ def held_rows(readings: Array, sensor: Sensor, rate: float) -> float | None:
     return typical if is_slow and at_once else 1.0
 
 
-def skips_zeros(sensor: Sensor) -> bool:
-    """Return whether zeros of all taxels are no reading of a sensor."""
-    return not sensor.rests_at_zero
+def differing_taxels(newer: npt.NDArray[Any], older: npt.NDArray[Any]) -> Flags:
+    """Return (..., n_taxels) whether readings (..., n_taxels, 3) differ; NaN is the same as NaN."""
+    differ = (newer != older) & ~(np.isnan(newer) & np.isnan(older))
+    return np.asarray(differ.any(axis=-1))
 
 
 class UpdateFilter:
@@ -154,7 +155,7 @@ def true_updates(recording: Recording) -> Recording:
         rate = 1 / (n_rows * module.period)
         if n_rows == 1.0 or not (every or rate < MIN_UPDATE_RATE):
             continue
-        repeats = UpdateFilter(rate, skips_zeros=skips_zeros(module.sensor))
+        repeats = UpdateFilter(rate, skips_zeros=not module.sensor.rests_at_zero)
         rows = zip(module.times.tolist(), module.readings, strict=True)
         kept = [repeats.is_update(time, reading) for time, reading in rows]
         times, readings = module.times[kept], module.readings[kept]

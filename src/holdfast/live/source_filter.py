@@ -6,6 +6,7 @@ No clock, no thread, no I/O: the times are those of the arrivals.
 import math
 from collections import deque
 from collections.abc import Iterable, Iterator, Mapping
+from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,8 @@ from holdfast.resampling import (
     MIN_UPDATE_RATE,
     Resampler,
     UpdateFilter,
+    differing_taxels,
     held_rows,
-    skips_zeros,
 )
 from holdfast.sensors import Sensor
 
@@ -122,7 +123,7 @@ class _Updates:
     """Newest updates of a finger: the last reading, when it came, and the updates before it."""
 
     def __init__(self, sensor: Sensor) -> None:
-        self._skips_zeros = skips_zeros(sensor)
+        self._skips_zeros = not sensor.rests_at_zero
         self._reading: npt.NDArray[Any] | None = None
         self._time, self._n_rows = math.nan, 0
         # Of each update: the time [s] and the rows since the one before; whether most taxels
@@ -136,19 +137,22 @@ class _Updates:
         if self._skips_zeros and not reading.any():
             return
         if before is not None:
-            both_nan = np.isnan(reading) & np.isnan(before)
-            differ = ((reading != before) & ~both_nan).any(axis=1)
-            if not differ.any():
+            n, n_changed = len(reading), np.count_nonzero(differing_taxels(reading, before))
+            if not n_changed:
                 return
-            at_once = len(differ) >= MIN_COMPARED_TAXELS and differ.mean() >= CHANGED_SHARE
+            at_once = n >= MIN_COMPARED_TAXELS and n_changed >= CHANGED_SHARE * n
             self._steps.append((time - self._time, self._n_rows, bool(at_once)))
         self._reading, self._time, self._n_rows = np.array(reading), time, 0
         if len(self._steps) < SLOW_UPDATES:
             return
         steps, rows, at_once_each = zip(*self._steps, strict=True)
-        is_held = all(at_once_each) or max(rows) - min(rows) <= 1
         longest = 1 / (MIN_UPDATE_RATE * (1 - EXACT_RATE))
-        self.is_slow = is_held and bool(np.median(steps) > longest and np.median(rows) > 1)
+        # The rows first: in a living stream every row is an update, and the rest is not looked at.
+        self.is_slow = (
+            median(rows) > 1
+            and median(steps) > longest
+            and (all(at_once_each) or max(rows) - min(rows) <= 1)
+        )
 
 
 class FilteredSamples(NamedTuple):
@@ -263,7 +267,7 @@ class SourceFilter:
             )
             rate /= n_rows
             self._updates = {
-                name: UpdateFilter(rate, skips_zeros=skips_zeros(sensor))
+                name: UpdateFilter(rate, skips_zeros=not sensor.rests_at_zero)
                 for name, sensor in self._fingers.items()
             }
         self.rate = rate

@@ -20,7 +20,6 @@ from holdfast.labelling.rules.forces import evidence_of_contact, hand_force
 from holdfast.labelling.server.workspace import summary_of
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Recording, Tactile, shown_origin
-from holdfast.resampling import skips_zeros
 
 CONSTANT_SECONDS = 0.5
 """Shortest stretch without any change of the readings that is reported [s]."""
@@ -184,7 +183,7 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         yield "many_taxels", text + "faults are looked for"
     still = [axis for axis, is_still in zip(AXES, module.still, strict=True) if is_still]
     if len(still) == len(AXES):
-        if skips_zeros(module.sensor) or module.lowest != 0 or module.highest != 0:
+        if not module.sensor.rests_at_zero or module.lowest != 0 or module.highest != 0:
             yield "dead", "the readings never change: the sensor is dead or disconnected"
         return
     if still:
