@@ -24,7 +24,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 from detection.c_detector import both, compare, random_samples  # noqa: E402
-from holdfast.detection import (  # noqa: E402  # noqa: E402
+from holdfast.detection import (  # noqa: E402
     DEPLOYED_FEATURES,
     Detector,
     FingerModel,
@@ -33,8 +33,7 @@ from holdfast.detection import (  # noqa: E402  # noqa: E402
     Model,
     parse_features,
 )
-from holdfast.detection.c_header import code_size  # noqa: E402
-from holdfast.exporters import header_of  # noqa: E402
+from holdfast.detection.c_header import code_size, header_of  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402
 
 FINGERS = ("thumb", "index", "middle", "ring")

@@ -73,11 +73,6 @@ class TestFit:
 
 
 @pytest.fixture(scope="module")
-def recordings():
-    return [sliding_recording(seed) for seed in range(6)]
-
-
-@pytest.fixture(scope="module")
 def trained(recordings):
     warnings = []
     return train(recordings, SETTING, warn=warnings.append), warnings

@@ -40,11 +40,6 @@ SETTING = Setting(window=6, features=FEATURES, trials=0, shared=True)
 
 
 @pytest.fixture(scope="module")
-def recordings():
-    return [sliding_recording(seed) for seed in range(6)]
-
-
-@pytest.fixture(scope="module")
 def trained(recordings):
     warnings = []
     return train(recordings, SETTING, warn=warnings.append), warnings

@@ -139,7 +139,7 @@ class Metrics(msgspec.Struct, frozen=True, omit_defaults=True):
 class RecordingResults:
     """Scores, events and alarms of a recording, without its samples.
 
-    A finger, or the hand, without labels has no events and no false alarms.
+    Without labels a finger, or the hand, has no events and no false alarms.
 
     Attributes:
         metrics: of the recording.

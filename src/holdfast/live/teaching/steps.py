@@ -73,6 +73,6 @@ STEPS = (
     Step("knock", "KNOCK WITH A TOOL", "On it and the hand; nothing slides.", Check.FELT, 20.0, 8),
     Step("nudge", "PUSH SOFTLY", "Stop before it slides.", Check.FELT, 20.0, 6),
 )  # fmt: skip
-"""The protocol: some seven minutes of samples, and 36 pulls and pushes of the whole hand. Open hand
-first, whose noise and dead taxels decide about all that follows; what slides before what does not,
-so that nobody stops before the slips."""
+"""The protocol: some seven minutes of samples, and 36 pulls and pushes of the whole hand. The open
+hand comes first: its noise and dead taxels decide about all that follows. Steps in which the object
+slides come before the others, so that nobody stops before the slips."""
