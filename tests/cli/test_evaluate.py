@@ -77,7 +77,7 @@ def test_the_tables_have_the_trivial_baseline(capsys, grasps):
     n, n_events = tn + fp + fn + tp, json.loads(document)["events"]["hand"]["n_events"]
     share = f"{100 * (fn + tp) / n:.1f}"
     assert rows[-2][:2] == [str(n), share]
-    assert rows[-1] == [str(n_events), "100.0", "100.0", "100.0", "never", "never", "0.0"]
+    assert rows[-1] == [str(n_events), "100.0", "100.0", "100.0", "never", "0.0", "0.0", "0.0"]
 
 
 def mixed(grasps, folder, *, labels=True):

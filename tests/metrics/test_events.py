@@ -246,3 +246,34 @@ def test_jitter_far_below_a_period_moves_times_alone(recording, seed):
     jitter = np.random.default_rng(seed).uniform(-1e-8, 1e-8, len(labels))
     one, two = match_alarms(times, labels, states), match_alarms(times + jitter, labels, states)
     assert ticks(one) == ticks(two)
+
+
+@pytest.mark.parametrize(
+    ("labels", "states", "held", "unstable", "rises"),
+    [
+        pytest.param([(N, 100), (S, 200)], [(N, 100), (S, 200)], 2.0, 0.0, 0, id="always right"),
+        pytest.param([(N, 100), (S, 200)], [(F, 300)], 2.0, 2.0, 0, id="always UNSTABLE"),
+        pytest.param(
+            [(S, 300)], [(S, 100), (F, 9), (S, 9), (F, 9), (S, 173)], 3.0, 0.18, 2, id="twice"
+        ),
+        pytest.param(
+            [(S, 100), (F, 20), (S, 100)],
+            [(S, 130), (F, 10), (S, 80)],
+            2.2,
+            0.1,
+            0,
+            id="late, within the tolerance of a disturbance",
+        ),
+        pytest.param([(S, 100), (N, 200)], [(S, 200), (F, 100)], 1.0, 0.0, 0, id="after release"),
+        pytest.param([(U, 300)], [(S, 100), (F, 200)], 0.0, None, None, id="nothing labelled"),
+    ],
+)
+def test_held_time_that_is_unstable_and_its_rises(labels, states, held, unstable, rises):
+    found = match(codes(*labels), codes(*states))
+    assert found.held.seconds == pytest.approx(held)
+    metrics = pool_events([found, found])
+    if not held:
+        assert metrics.held_unstable is metrics.rises_per_minute is None
+        return
+    assert metrics.held_unstable == pytest.approx(100 * unstable / held)
+    assert metrics.rises_per_minute == pytest.approx(60 * rises / held)

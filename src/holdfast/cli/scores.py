@@ -84,11 +84,22 @@ def print_metrics(metrics: "Metrics") -> None:
     print_line(f"by event (onset of instability in a held contact, {origin_of(hand)}{margin})")
     missed = ["100.0" if hand.n_events else "-"] * len(hand.missed)
     print_table(
-        ("", "events", "missed 0.05 s", "0.1 s", "0.2 s %", "delay s", "p95 s", "alarms/min"),
+        (
+            "",
+            "events",
+            "missed 0.05 s",
+            "0.1 s",
+            "0.2 s %",
+            "delay s",
+            "alarms /min",
+            "UNSTABLE %",
+            "rises /min",
+        ),
         [
             *(_event_row(name, finger) for name, finger in metrics.events.fingers.items()),
             _event_row("hand", hand),
-            ("always STABLE", str(hand.n_events), *missed, "never", "never", "0.0"),
+            ("always STABLE", str(hand.n_events), *missed, "never", "0.0", "0.0", "0.0"),
+            ("always UNSTABLE", str(hand.n_events), *missed, "never", "0.0", "100.0", "0.0"),
         ],
     )
     if metrics.intervals is not None:
@@ -105,13 +116,11 @@ def _sample_row(name: str, metrics: "SampleMetrics") -> tuple[str, ...]:
 
 def _event_row(name: str, metrics: "EventMetrics") -> tuple[str, ...]:
     missed = (format_number(share, 1) for share in metrics.missed.values())
-    delays = (
-        # Events without any delay: all were missed.
-        format_number(delay, 3) if delay is not None or not metrics.n_events else "never"
-        for delay in (metrics.delay_median, metrics.delay_p95)
-    )
-    false_alarms = format_number(metrics.false_alarms_per_minute, 1)
-    return name, str(metrics.n_events), *missed, *delays, false_alarms
+    is_never = metrics.delay_median is None and metrics.n_events > 0  # half or more were missed
+    delay = "never" if is_never else format_number(metrics.delay_median, 3)
+    rates = (metrics.false_alarms_per_minute, metrics.held_unstable, metrics.rises_per_minute)
+    numbers = (format_number(rate, 1) for rate in rates)
+    return name, str(metrics.n_events), *missed, delay, *numbers
 
 
 def _print_intervals(intervals: "Intervals") -> None:

@@ -195,7 +195,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
             return ""
         return (
             f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
-            "teach): slip_probability is a ranking, and UNSTABLE the sign to grip harder in advance"
+            "teach): slip_probability is a ranking, and UNSTABLE a disturbance, no sign of a slip"
         )
 
     def with_training(self, training: Training, blocks: Sequence[Digests]) -> Self:

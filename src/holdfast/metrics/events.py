@@ -79,6 +79,29 @@ class FalseAlarm(NamedTuple):
     label: ContactState
 
 
+class HeldTime(NamedTuple):
+    """Decisions while a contact is held: its label is STABLE or UNSTABLE.
+
+    Attributes:
+        seconds: duration [s].
+        unstable_seconds: time of these that is decided as UNSTABLE [s].
+        n_rises: changes of the decision to UNSTABLE outside disturbances: the label is STABLE, and
+            no alarm here would belong to a run of not-stable labels.
+    """
+
+    seconds: float = 0.0
+    unstable_seconds: float = 0.0
+    n_rises: int = 0
+
+    @classmethod
+    def total(cls, parts: Sequence[Self]) -> Self:
+        """Return the sums over all parts."""
+        return cls(*map(sum, zip(*parts, strict=True)))
+
+
+NO_HELD_TIME = HeldTime()
+
+
 @dataclass(frozen=True)
 class AlarmMatch:
     """Events and alarms of one finger, or hand, in one recording.
@@ -89,6 +112,7 @@ class AlarmMatch:
         stable_seconds: duration of stable labels [s].
         onsets: where the labels come from in which the events were found.
         n_unlabelled: number of other alarms, where nothing is labelled: neither true nor false.
+        held: time that is UNSTABLE, and rises to it, in held contact.
     """
 
     events: tuple[InstabilityEvent, ...]
@@ -96,6 +120,7 @@ class AlarmMatch:
     stable_seconds: float
     onsets: Onsets = "labels"
     n_unlabelled: int = 0
+    held: HeldTime = NO_HELD_TIME
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +133,7 @@ class EventCounts:
         stable_seconds: duration of stable labels [s].
         onsets: where the onsets come from; empty without recordings.
         n_unlabelled: number of alarms where nothing is labelled.
+        held: time that is UNSTABLE, and rises to it, in held contact.
     """
 
     delays: Array
@@ -115,6 +141,7 @@ class EventCounts:
     stable_seconds: float
     onsets: frozenset[Onsets]
     n_unlabelled: int
+    held: HeldTime
 
     @classmethod
     def of(cls, match: AlarmMatch) -> Self:
@@ -126,6 +153,7 @@ class EventCounts:
             match.stable_seconds,
             frozenset({match.onsets}),
             match.n_unlabelled,
+            match.held,
         )
 
     @classmethod
@@ -137,6 +165,7 @@ class EventCounts:
             sum(part.stable_seconds for part in parts),
             frozenset[Onsets]().union(*(part.onsets for part in parts)),
             sum(part.n_unlabelled for part in parts),
+            HeldTime.total([NO_HELD_TIME, *(part.held for part in parts)]),
         )
 
     @property
@@ -165,6 +194,10 @@ class EventMetrics(msgspec.Struct, frozen=True):
         onsets: `truth` where the recordings have it, else `labels`; `mixed` if some have it;
             `rule` if a rule made labels of one.
         unlabelled_alarms: number of alarms where nothing is labelled: neither true nor false.
+        held_unstable: share of held time (labels STABLE and UNSTABLE) that is decided as
+            UNSTABLE [%]; None without held time.
+        rises_per_minute: changes to UNSTABLE outside disturbances, per minute of held time; None
+            without held time.
     """
 
     n_events: int
@@ -176,6 +209,8 @@ class EventMetrics(msgspec.Struct, frozen=True):
     false_alarms: dict[str, int]
     onsets: Onsets = "labels"
     unlabelled_alarms: int = 0
+    held_unstable: float | None = None
+    rises_per_minute: float | None = None
 
 
 def event_metrics(
@@ -261,8 +296,18 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
             for (onset, end), alarm in zip(events.tolist(), first.tolist(), strict=True)
         ),
         tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
-        float((stable[:, 1] - stable[:, 0]).sum()),
+        _duration(label == STABLE, time),
         n_unlabelled=len(others) - len(false),
+        held=_held_time(time, label, state, alarm_windows(unstable)),
+    )
+
+
+def _held_time(times: Array, labels: Codes, states: Codes, disturbances: Array) -> HeldTime:
+    held, is_unstable = np.isin(labels, (STABLE, UNSTABLE)), states == UNSTABLE
+    rises = np.flatnonzero(is_unstable[1:] & ~is_unstable[:-1]) + 1
+    calm = (labels == STABLE) & outside(times, disturbances)
+    return HeldTime(
+        _duration(held, times), _duration(held & is_unstable, times), int(calm[rises].sum())
     )
 
 
@@ -328,6 +373,10 @@ def event_metrics_of(counts: EventCounts) -> EventMetrics:
         false_alarms={str(state): n for state, n in counts.false_alarms.items()},
         onsets=common_onsets(counts.onsets),
         unlabelled_alarms=counts.n_unlabelled,
+        held_unstable=percent(counts.held.unstable_seconds, counts.held.seconds),
+        rises_per_minute=counts.held.n_rises * 60 / counts.held.seconds
+        if counts.held.seconds
+        else None,
     )
 
 
@@ -341,6 +390,11 @@ _STATES = tuple(ContactState)
 
 def _not_stable(codes: Codes) -> npt.NDArray[np.bool_]:
     return np.isin(codes, (UNSTABLE, NO_CONTACT))
+
+
+def _duration(mask: npt.NDArray[np.bool_], times: Array) -> float:
+    spans = _spans(mask, times)
+    return float((spans[:, 1] - spans[:, 0]).sum())
 
 
 def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
