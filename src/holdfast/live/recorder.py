@@ -25,7 +25,7 @@ FLUSH_INTERVAL = 0.2
 """Time between two writes to disk [s]."""
 SYNC_INTERVAL = 0.5
 """Time between two waits for the disk with `fsync`; the first write after it waits [s]. With
-`FLUSH_INTERVAL`, a power failure loses at most 0.7 s and one wait (docs/reliability.md)."""
+`FLUSH_INTERVAL`, a power failure loses at most 0.7 s and one wait (docs/study/reliability.md)."""
 MAX_QUEUED_ARRIVALS = 4096
 """Maximum number of arrivals that wait for the disk: some 30 MB of a whole hand, or 27 s at
 150 Hz."""
