@@ -4,6 +4,7 @@ from dataclasses import fields
 from importlib import metadata
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import holdfast
@@ -28,7 +29,39 @@ def test_public_names_and_no_others():
     assert sorted([*PUBLIC, "__version__"]) == holdfast.__all__
     for name in PUBLIC:
         assert getattr(holdfast, name) is not None
-        assert name in dir(holdfast)
+    assert dir(holdfast) == holdfast.__all__
+
+
+def test_star_imports_what_a_bare_install_has(monkeypatch):
+    hidden = "import importlib.util as u; f = u.find_spec\n"
+    hidden += "u.find_spec = lambda name, *a: None if name == 'sklearn' else f(name, *a)\n"
+    code = (
+        hidden + "from holdfast import *; print('train' in dir(), 'StabilityClassifier' in dir())"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "False"]
+
+
+def test_names_are_taken_where_objects_are():
+    times, readings = np.arange(200) / 100, np.random.default_rng(0).normal(size=(200, 16, 3))
+    module = holdfast.Tactile("uskin-4x4", times, readings)
+    assert module.sensor == holdfast.sensor("uskin-4x4")
+    recording = holdfast.Recording("mine", {"index": module})
+    model = holdfast.Model.load("builtin:any")
+    by_name = holdfast.detect("builtin:any", recording)
+    assert by_name.to_frame().equals(holdfast.detect(model, recording).to_frame())
+    assert holdfast.Detector("builtin:any", {"index": "uskin-4x4"}).reset() is None
+    for value in (module, recording, model, by_name):
+        assert len(repr(value)) < 100
+
+
+@pytest.mark.parametrize(
+    ("modules", "what"),
+    [(np.zeros((9, 16, 3)), "ndarray"), ({"index": np.zeros((9, 16, 3))}, "ndarray"), (7, "int")],
+)
+def test_a_recording_of_arrays_names_what_it_needs(modules, what):
+    with pytest.raises(holdfast.RecordingError, match=r"Tactile\(.*" + what):
+        holdfast.Recording("mine", modules)
 
 
 def test_the_order_of_fields_is_fixed():

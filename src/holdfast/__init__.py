@@ -10,6 +10,7 @@ Example:
 """
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -102,7 +103,9 @@ _NAMES = {
 """Public names of each module."""
 _HOMES = {name: module for module, names in _NAMES.items() for name in names}
 
-__all__ = sorted([*_HOMES, "__version__"])  # noqa: PLE0605 (one list of names, above)
+# Without scikit-learn (extra `train`) `from holdfast import *` leaves its estimator out.
+_MISSING = set() if find_spec("sklearn") else {"StabilityClassifier"}
+__all__ = sorted({*_HOMES, "__version__"} - _MISSING)  # noqa: PLE0605 (one list of names, above)
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (the value is any of the public names)
@@ -117,4 +120,4 @@ def __getattr__(name: str) -> Any:  # noqa: ANN401 (the value is any of the publ
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return __all__

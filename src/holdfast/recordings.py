@@ -15,7 +15,7 @@ import numpy.typing as npt
 from holdfast.blocks import Digests, module_blocks
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, as_sensor
 from holdfast.sensors.types import Array, Flags, Unit, rebuilt
 
 GAP_PERIODS = 3.0
@@ -77,7 +77,7 @@ class Tactile:
     The arrays are read-only. Readings keep their number type.
 
     Attributes:
-        sensor: the sensor that gave the readings.
+        sensor: the sensor that gave the readings, or the name of a built-in one.
         times: (n,) strictly increasing, on the clock of the recording [s].
         readings: (n, n_taxels, 3) in taxel frames [unit]; NaN where a value is missing.
         unit: `count` or `N`; by default the unit of the sensor. Another unit means that the
@@ -88,10 +88,8 @@ class Tactile:
         RecordingError: shapes, times or labels contradict each other.
 
     Example:
-        >>> from holdfast.sensors import sensor
-        >>> module = Tactile(sensor("uskin-4x4"), np.arange(3) / 100, np.zeros((3, 16, 3)))
-        >>> module.n_samples, round(module.rate), module.unit
-        (3, 100, 'count')
+        >>> Tactile("uskin-4x4", np.arange(3) / 100, np.zeros((3, 16, 3)))
+        Tactile('uskin-4x4', 3 samples of 16 taxels, 100 Hz, count, 0 labels)
     """
 
     sensor: Sensor
@@ -103,7 +101,8 @@ class Tactile:
     def __post_init__(self) -> None:
         times = _read_only(np.asarray(self.times, dtype=np.float64))
         readings = _read_only(np.asarray(self.readings))
-        sensor = self.sensor
+        sensor = as_sensor(self.sensor)
+        object.__setattr__(self, "sensor", sensor)
         if times.ndim != 1:
             raise RecordingError(f"times of shape (n,) expected, {times.shape} given")
         if readings.ndim != 3 or readings.shape[2] != 3:
@@ -134,14 +133,20 @@ class Tactile:
         labels = tuple(sorted(self.labels, key=lambda label: label.start))
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
-        unit = self.unit or self.sensor.unit
-        if unit != self.sensor.unit:  # calibrated: range, step and rest are those of raw readings
-            raw = replace(self.sensor, unit=unit, range=None, step=None, rests_at_zero=False)
+        unit = self.unit or sensor.unit
+        if unit != sensor.unit:  # calibrated: range, step and rest are those of raw readings
+            raw = replace(sensor, unit=unit, range=None, step=None, rests_at_zero=False)
             object.__setattr__(self, "sensor", raw)
         object.__setattr__(self, "unit", unit)
         object.__setattr__(self, "labels", labels)
         if labels:
             _check_labels(labels, times, self.period)
+
+    def __repr__(self) -> str:
+        return (
+            f"Tactile({self.sensor.name!r}, {self.n_samples} samples of {self.sensor.n_taxels} "
+            f"taxels, {self.rate:.4g} Hz, {self.unit}, {len(self.labels)} labels)"
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
@@ -260,6 +265,9 @@ class Truth:
         object.__setattr__(self, "hand", _locked_arrays(self.hand, n))
         object.__setattr__(self, "fingers", MappingProxyType(fingers))
 
+    def __repr__(self) -> str:
+        return f"Truth({len(self.times)} samples of the hand and {', '.join(self.fingers)})"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
 
@@ -294,11 +302,9 @@ class Recording:
         RecordingError: there is no module, or no module has a sample.
 
     Example:
-        >>> from holdfast.sensors import sensor
-        >>> module = Tactile(sensor("uskin-4x4"), np.arange(3) / 100, np.zeros((3, 16, 3)))
-        >>> recording = Recording("made", {"index": module})
-        >>> recording.start, recording.end, recording.duration
-        (0.0, 0.02, 0.02)
+        >>> module = Tactile("uskin-4x4", np.arange(3) / 100, np.zeros((3, 16, 3)))
+        >>> Recording("made", {"index": module})
+        Recording('made', 0.02 s of index)
     """
 
     name: str
@@ -310,12 +316,23 @@ class Recording:
     complete: bool = True
 
     def __post_init__(self) -> None:
-        if not any(module.n_samples for module in self.modules.values()):
+        modules = self.modules.values() if isinstance(self.modules, Mapping) else [self.modules]
+        for module in modules:
+            if not isinstance(module, Tactile):
+                raise RecordingError(
+                    f"recording {self.name!r}: modules by name expected, as "
+                    '{"index": Tactile("uskin-4x4", times, readings)}; '
+                    f"{type(module).__name__} given"
+                )
+        if not any(module.n_samples for module in modules):
             raise RecordingError(f"recording {self.name!r} has no samples; at least one expected")
         object.__setattr__(self, "modules", MappingProxyType(dict(self.modules)))
         object.__setattr__(self, "metadata", MappingProxyType(dict(self.metadata)))
         object.__setattr__(self, "markers", tuple((float(t), str(x)) for t, x in self.markers))
         object.__setattr__(self, "media", tuple((str(p), float(t)) for p, t in self.media))
+
+    def __repr__(self) -> str:
+        return f"Recording({self.name!r}, {self.duration:.4g} s of {', '.join(self.modules)})"
 
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
+from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -24,7 +25,7 @@ from holdfast.kernel import _extension
 from holdfast.kernel.structs import struct_type
 from holdfast.recordings import BASELINES, Recording
 from holdfast.resampling import at_rate
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, as_sensor
 from holdfast.sensors.types import Array
 
 IgnoredTaxels = Mapping[str, Sequence[int]]
@@ -38,9 +39,9 @@ class Detector:
     """Detector of contact states for one hand, sample by sample.
 
     Args:
-        model: features, classifiers and decision rule.
-        fingers: sensor of each finger, for a model of any finger; by default all fingers that
-            the model names.
+        model: features, classifiers and decision rule; or its file, or the name of a built-in one.
+        fingers: sensor of each finger, or its name, for a model of any finger; by default all
+            fingers that the model names.
         rate: samples per second of the source [Hz], for a model of any rate; by default the
             rate of the first sensor.
         ignore: indices by finger, from 0, of taxels that contribute nothing and cause no fault.
@@ -54,8 +55,7 @@ class Detector:
         ValueError: `ignore` names a finger or a taxel that does not exist.
 
     Example:
-        >>> from holdfast.sensors import sensor
-        >>> detector = Detector(Model.load("builtin:noise-floor"), {"index": sensor("uskin-4x4")})
+        >>> detector = Detector("builtin:noise-floor", {"index": "uskin-4x4"})
         >>> estimate = detector.update({"index": np.full((16, 3), 32000)}, time=0.0)
         >>> estimate.fingers["index"].state, estimate.fingers["index"].reason
         (<ContactState.UNKNOWN: 'UNKNOWN'>, <Reason.TARE: 'tare'>)
@@ -63,16 +63,17 @@ class Detector:
 
     def __init__(
         self,
-        model: Model,
-        fingers: Mapping[str, Sensor] | None = None,
+        model: Model | str | Path,
+        fingers: Mapping[str, Sensor | str] | None = None,
         rate: float | None = None,
         *,
         ignore: IgnoredTaxels | None = None,
         in_contact: bool = False,
         baselines: Mapping[str, npt.ArrayLike] | None = None,
     ) -> None:
+        model = Model.of(model)
         if fingers is not None:
-            sensors = model.fingers_of(fingers)
+            sensors = model.fingers_of({f: as_sensor(kind) for f, kind in fingers.items()})
         elif any(f == "*" or part.sensor is None for f, part in model.fingers.items()):
             raise ModelError(
                 f"the model {model.name or 'given'} is for any finger: the fingers of the hand and "
@@ -297,11 +298,13 @@ class Detector:
             self._present[fingers.index(finger)] = True
 
 
-def detect(model: Model, recording: Recording, *, in_contact: bool | None = None) -> Detection:
+def detect(
+    model: Model | str | Path, recording: Recording, *, in_contact: bool | None = None
+) -> Detection:
     """Return the estimates of a whole recording, the same as `Detector.update` gives.
 
     Args:
-        model: features, classifiers and decision rule.
+        model: features, classifiers and decision rule; or its file, or the name of a built-in one.
         recording: that has some of the model's fingers. Of a sample-and-hold sensor its true
             updates are used. It is resampled first, if its rate is not within 20 % of the model's.
         in_contact: the first samples are load; None if the metadata say it (`starts_loaded`).
@@ -316,10 +319,11 @@ def detect(model: Model, recording: Recording, *, in_contact: bool | None = None
     Example:
         >>> from holdfast.synthetic import synthetic_recording
         >>> recording = synthetic_recording("made", seed=0)
-        >>> found = detect(Model.load("builtin:noise-floor"), recording)
+        >>> found = detect("builtin:noise-floor", recording)
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
+    model = Model.of(model)
     recording = at_rate(recording.with_start(loaded=in_contact), model.rate)
     return Detector.for_recording(model, recording).run(recording)
 

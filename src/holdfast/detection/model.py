@@ -107,11 +107,8 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         ModelError: the fields contradict each other.
 
     Example:
-        >>> model = Model.load("builtin:twin")
-        >>> model.rate, list(model.fingers), [str(x) for x in model.finger("thumb").features[:2]]
-        (150.0, ['*'], ['log(F_a)', 'log(sigma_xyz[4])'])
-        >>> ", ".join(head.name for head in model.finger("thumb").heads)
-        'stable, slip, slip_speed, cause'
+        >>> Model.load("builtin:twin")
+        Model('builtin:twin', 150 Hz, fingers *: stable, slip, slip_speed, cause)
     """
 
     fingers: dict[str, FingerModel]
@@ -159,6 +156,18 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         if str(path).startswith("builtin:"):
             return cls(**msgspec.structs.asdict(built_in(str(path))))
         return read_model(path, cls)
+
+    @classmethod
+    def of(cls, model: "Model | str | Path") -> "Model":
+        """Return a model, given it, its file, or the name of a built-in one."""
+        return model if isinstance(model, Model) else cls.load(model)
+
+    def __repr__(self) -> str:
+        rate = "any rate" if self.rate is None else f"{self.rate:g} Hz"
+        heads = {head.name: None for part in self.fingers.values() for head in part.heads}
+        return (
+            f"Model({self.name!r}, {rate}, fingers {', '.join(self.fingers)}: {', '.join(heads)})"
+        )
 
     def save(self, path: str | Path, *, force: bool = False) -> None:
         """Write the model as JSON.

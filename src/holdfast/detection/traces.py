@@ -164,6 +164,9 @@ class Detection:
     times: Array
     hand: npt.NDArray[np.int8]
 
+    def __repr__(self) -> str:
+        return f"Detection({self.name!r}, {len(self.times)} samples of {', '.join(self.fingers)})"
+
     def to_frame(self) -> "DataFrame":
         """Return the estimates as a pandas DataFrame: a row for each finger and sample.
 

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,13 +119,14 @@ class StreamDetector:
 
     def __init__(
         self,
-        model: Model,
+        model: Model | str | Path,
         source: Source,
         *,
         strict: bool = False,
         ignore: Mapping[str, tuple[int, ...]] | None = None,
         in_contact: bool = False,
     ) -> None:
+        model = Model.of(model)
         tare = Tare.parse(model.tare)
         if tare.kind == "interval":
             raise ModelError(

@@ -1,6 +1,7 @@
 """Sensors and hands: the pose of each taxel, built-in layouts, and XELA's model names."""
 
 from holdfast.sensors.built_in import (
+    as_sensor,
     built_in_hands,
     built_in_sensors,
     flat_sensor,
@@ -14,6 +15,7 @@ __all__ = [
     "Hand",
     "HandModule",
     "Sensor",
+    "as_sensor",
     "built_in_hands",
     "built_in_sensors",
     "flat_sensor",

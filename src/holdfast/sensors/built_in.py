@@ -32,6 +32,11 @@ def sensor(name: str) -> Sensor:
     return SENSORS[name]()
 
 
+def as_sensor(value: Sensor | str) -> Sensor:
+    """Return a sensor, given it or the name of a built-in one."""
+    return sensor(value) if isinstance(value, str) else value
+
+
 def hand(name: str) -> Hand:
     """Return the built-in hand of this name.
 

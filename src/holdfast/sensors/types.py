@@ -149,6 +149,9 @@ class Sensor:
                 f"{low:g} to {high:g} given"
             )
 
+    def __repr__(self) -> str:
+        return f"Sensor({self.name!r}, {self.n_taxels} taxels, {self.rate:g} Hz, {self.unit})"
+
     def __reduce__(self) -> tuple[Any, ...]:
         return rebuilt(self)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -158,7 +159,7 @@ class Evaluation:
 
 
 def evaluate(
-    model: Model,
+    model: Model | str | Path,
     recordings: Iterable[Recording],
     seed: int = 0,
     engine: Engine = Engine(),  # noqa: B008 (a tuple: it cannot change)
@@ -176,6 +177,7 @@ def evaluate(
         ModelError: a recording has other fingers or sensors.
         EngineError: the engine cannot be used.
     """
+    model = Model.of(model)
     if isinstance(recordings, Sequence):
         return evaluate_recordings(model, recordings, seed, engine).metrics
     return summarise((compute_decisions(model, recording) for recording in recordings), seed=seed)
