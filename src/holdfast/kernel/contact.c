@@ -16,9 +16,6 @@
 /* Share of the largest load so far that a touch exceeds: a contact begins above 0.12 of it, and
  * ends below 0.08, the echo that a released skin may still show (motion.c). */
 #define HF_TOUCH_SHARE ((hf_real)1.5 * HF_RELEASED_SHARE)
-/* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
- * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
-#define HF_REST_SECONDS 0.2
 /* A force is unsteady while it changes within 0.133 s by more than a quarter of the largest load of
  * the last seconds, and by 16 times its noise. The noise of such a change is 5 standard deviations
  * of a white one times 2.3, the most that was measured on a real sensor; with 10 times, a gripper
@@ -31,16 +28,37 @@
 /* How the load came over the threshold of contact. */
 enum { HF_NO_EXCESS, HF_TOUCH, HF_DRIFT };
 
-/* Return whether a load is below the threshold of contact, which is lower while in contact.
- *
- * latest: the state of the last sample, before the minimum duration. */
-static bool hf_is_unloaded(hf_real load, hf_real peak, hf_real threshold, int32_t latest)
+static bool hf_was_in_contact(const holdfast_decision *d)
+{
+    /* At the last sample, before the minimum duration. */
+    return d->candidate == HOLDFAST_STABLE || d->candidate == HOLDFAST_UNSTABLE;
+}
+
+/* Return whether a load is below the threshold of contact, which is lower while in contact. */
+static bool hf_is_unloaded(
+    const holdfast_decision *d, hf_real load, hf_real peak, hf_real threshold)
 {
     /* In contact: load < max(0.7 threshold, 0.08 peak); else load < max(threshold, 0.12 peak). */
-    if (latest == HOLDFAST_STABLE || latest == HOLDFAST_UNSTABLE) {
+    if (hf_was_in_contact(d)) {
         return load < hf_max(HF_CONTACT_RELEASE_RATIO * threshold, HF_RELEASED_SHARE * peak);
     }
     return load < hf_max(threshold, HF_TOUCH_SHARE * peak);
+}
+
+/* Return whether the load of relative features is below the threshold of contact, or an echo.
+ *
+ * A skin that was let go creeps, and its tare has drifted since: the peak is forgotten faster than
+ * what is left goes. So a load that falls in one motion has a larger share of it, and what it left
+ * is no touch until it rises again. */
+static bool hf_is_echo(
+    const hf_finger *f, const holdfast_decision *d, hf_real load, hf_real peak, hf_real threshold)
+{
+    /* In contact: load < 0.12 of that of the motion; else the echo has 0.08 of a peak at least. */
+    if (hf_was_in_contact(d)) {
+        return hf_is_unloaded(d, load, peak, threshold) ||
+               load < HF_TOUCH_SHARE * f->state->motion.moving_load;
+    }
+    return hf_is_unloaded(d, load, hf_max(peak, d->echo / HF_RELEASED_SHARE), threshold);
 }
 
 /* Return how far the normal force fell below that of the first sample. */
@@ -72,7 +90,7 @@ static int hf_contact_by_load(
         }
         peak = hf_max(peak, fall);
     }
-    if (!hf_is_unloaded(m->contact_load, peak, threshold, d->candidate)) {
+    if (!hf_is_echo(f, d, m->contact_load, peak, threshold)) {
         d->loaded_at = time;
         /* Unsteady: |F(k) - F(k - 0.133 s / T)| > max(peak / 4, 16 noise). */
         const hf_real least = hf_max(HF_UNSTEADY_SHARE * peak, HF_UNSTEADY_TO_NOISE * m->noise);
@@ -81,6 +99,7 @@ static int hf_contact_by_load(
     const double last = d->loaded_at > m->moved_at ? d->loaded_at : m->moved_at;
     if (d->candidate == HOLDFAST_NO_CONTACT || f->state->is_untouched ||
         time - last > HF_REST_SECONDS) {
+        d->echo = hf_was_in_contact(d) ? m->contact_load : hf_min(d->echo, m->contact_load);
         return HF_WITHOUT_CONTACT;
     }
     /* A grip was seen: peak >= 100 noise. A stream may begin in contact undeclared. */
@@ -93,14 +112,14 @@ static int hf_contact_by_load(
 static int hf_contact_by_force(
     const holdfast_decision *d, hf_real load, hf_real threshold, bool zero_unknown, double time)
 {
-    if (!(threshold > 0 && hf_is_unloaded(load, d->peak, threshold, d->candidate))) {
+    if (!(threshold > 0 && hf_is_unloaded(d, load, d->peak, threshold))) {
         return HF_IN_CONTACT;
     }
     /* A load below the threshold itself is no contact at once. One below a share of the peak has to
      * rest first, for 0.2 s with the sigma of noise; and so has any load if it counts from the
      * least force so far, because that may still fall. */
     if (time - d->shaken_at > HF_REST_SECONDS ||
-        (!zero_unknown && hf_is_unloaded(load, 0, threshold, d->candidate))) {
+        (!zero_unknown && hf_is_unloaded(d, load, 0, threshold))) {
         return HF_WITHOUT_CONTACT;
     }
     return HF_UNSTEADY;

@@ -29,6 +29,9 @@
 #define HF_NOISE_WEIGHT ((hf_real)100)
 /* Share of the largest load that a released skin may still show. */
 #define HF_RELEASED_SHARE ((hf_real)0.08)
+/* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
+ * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
+#define HF_REST_SECONDS 0.2
 
 /* Faults of a finger whose samples no window may hold, though they have a force. */
 enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };

@@ -62,6 +62,7 @@ typedef struct {
     double block_start;        /* [s]; NaN before the first sample */
     double moved_at;           /* when the force last moved by much more than its noise [s] */
     hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
+    hf_real moving_load;       /* largest load beyond contact_zero since it began to move */
     hf_real pressure;          /* sum of |h_i . n| over the taxels */
     hf_real pressure_squares;  /* sum of their squares */
     hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
@@ -184,7 +185,7 @@ typedef struct {
 
 /* What is remembered of the decisions about a finger. Times are NaN where there was none.
  *
- * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at and loaded_at;
+ * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at, loaded_at and echo;
  * heads.c scores and all about slips; decision.c the rest. */
 typedef struct {
     int32_t state;            /* that is reported */
@@ -202,6 +203,7 @@ typedef struct {
     hf_real peak;             /* largest load so far, slowly forgotten */
     double shaken_at;         /* when sigma was last much larger than that of noise [s] */
     double loaded_at;         /* when the load was last that of a contact [s] */
+    hf_real echo;             /* least load since it was; 0 before */
     hf_real filtered;         /* log odds by the forward filter; NaN before its first sample */
     double filtered_at;       /* time of that sample [s] */
     hf_real slip_log_odds;    /* smoothed; NaN before its first sample */

@@ -236,7 +236,8 @@ static void hf_update_contact_load(const hf_finger *f, size_t now, hf_real keep)
 }
 
 /* Note how far the force moved, and when: by much more than its noise, and than an echo. */
-static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, double time)
+static void hf_update_movement(
+    const hf_finger *f, size_t now, size_t n_before, hf_real keep, double time)
 {
     holdfast_motion *const m = &f->state->motion;
     /* moved = |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves. */
@@ -248,9 +249,15 @@ static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, 
     hf_real change[3];
     hf_force_between(f, hf_index_before(f, now, back), now, change);
     m->moved_by = hf_sqrt(hf_square(change));
+    bool is_at_rest = time - m->moved_at > HF_REST_SECONDS;
     if (m->moved_by > hf_max(HF_MOVED_TO_NOISE * m->noise, HF_RELEASED_SHARE * m->peak_load)) {
+        m->moving_load = is_at_rest ? 0 : m->moving_load; /* a motion begins */
         m->moved_at = time;
+        is_at_rest = false;
     }
+    /* The largest load of the motion, which is forgotten like the peak once the force rests. */
+    m->moving_load =
+        is_at_rest ? keep * m->moving_load : hf_max(m->contact_load, m->moving_load);
 }
 
 /* Update the tangent, and the ratio of tangential to normal force. */
@@ -414,7 +421,7 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     hf_update_noise(f, time);
     hf_update_load(f, now, keep);
     hf_update_contact_load(f, now, keep);
-    hf_update_movement(f, now, n_before, time);
+    hf_update_movement(f, now, n_before, keep, time);
     if (hand->has_ratios) {
         hf_update_ratio(f, now);
     }

@@ -70,6 +70,48 @@ def test_a_finger_is_not_stable_once_its_force_has_gone(rest):
     assert (states[gone + 45 :] == NO_CONTACT).all()
 
 
+CLOSED = ((1, 0), (0.3, 1), (4, 1))
+OPENED = {
+    "9 % that creep": ((0.2, 0.09), (1, 0.07), (4, 0.06)),
+    "4 % that stay for longer than the peak": ((0.2, 0.07), (1, 0.05), (2, 0.04), (40, 0.04)),
+    "7 % that drift to 9": ((0.2, 0.07), (10, 0.09)),
+}
+HELD = {
+    "15 % at once": ((0.2, 0.15), (8, 0.15)),
+    "10 % in 3 s": ((3, 0.1), (8, 0.1)),
+    "10 % by two motions": ((0.1, 0.3), (1, 0.3), (0.1, 0.1), (8, 0.1)),
+}
+AGAIN = {
+    "a lighter grip": ((0.2, 0), (1, 0), (0.2, 0.15), (2, 0.15)),
+    "a press on what is left": ((0.2, 0.07), (8, 0.04), (8, 0.15)),
+}
+
+
+@pytest.mark.parametrize("name", OPENED)
+def test_what_a_release_leaves_is_no_contact_to_the_end(name):
+    states = states_of(steps(*CLOSED, *OPENED[name]))
+    assert (states[550 + 50 :] == NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("name", HELD)
+def test_a_grip_that_is_loosened_is_held(name):
+    states = states_of(steps(*CLOSED, *HELD[name]))
+    assert (states[150:] != NO_CONTACT).all()
+
+
+@pytest.mark.parametrize("name", AGAIN)
+def test_a_touch_after_a_release_rises_from_what_that_left(name):
+    states = states_of(steps(*CLOSED, *AGAIN[name]))
+    assert NO_CONTACT in states[550:650]
+    assert (states[-100:] == STABLE).all()
+
+
+def test_a_light_grip_is_held_and_released():
+    states = states_of(steps((1, 0), (0.2, 0.02), (5, 0.02), (0.2, 0), (3, 0)))
+    assert (states[250:620] == STABLE).all()
+    assert (states[690:] == NO_CONTACT).all()
+
+
 def test_shear_that_draws_the_normal_force_down_is_held():
     """As a magnetic skin: the shear grows, and its normal readings fall at some taxels."""
     n = round(6 * RATE)
