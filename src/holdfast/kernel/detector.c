@@ -87,6 +87,9 @@ HF_API int32_t holdfast_detect(
         const holdfast_rule *const rule = &model->rules[i];
         holdfast_decision *const decision = &d->decisions[i];
         int contact = HF_IN_CONTACT;
+        if (present[i] && f.state->n_seen <= 1) { /* the stream begins, perhaps again */
+            hf_start_decision(decision);
+        }
         if (present[i] && f.values->reason == HOLDFAST_READY) {
             contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
         }

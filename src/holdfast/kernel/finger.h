@@ -252,7 +252,10 @@ HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap)
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
 HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan);
 
-/* tare.c */
+/* tare.c: how far the first sample is known to be a reading */
+enum { HF_PROVISIONAL, HF_SETTLES, HF_CONFIRMED };
+HF_SHARED void hf_begin_again(const hf_finger *f, double time);
+HF_SHARED void hf_confirm_zero(const hf_finger *f, double time);
 HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
 
 /* field.c */

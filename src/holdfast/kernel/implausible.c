@@ -265,7 +265,7 @@ HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan)
     if (hf_is_near_end(f, scan)) {
         faults |= HOLDFAST_SATURATED;
     }
-    if (s->is_tared) {
+    if (s->is_tared && s->zero == HF_CONFIRMED) {
         if (isnan(s->rest_sum)) { /* that of the tare; of the first sample where there is none */
             s->rest_sum = f->hand->tare_kind == HOLDFAST_TARE_NONE
                               ? scan->total

@@ -83,6 +83,10 @@ typedef struct {
     bool is_alive;     /* a reading has changed, or the finger rests at zero as it may (faults.c) */
     size_t row;        /* of the newest force in the rings of history and blocks */
     /* Tare and noise (tare.c). */
+    int32_t zero;           /* whether the first sample is confirmed to be a reading */
+    double provisional_end; /* when it is at the latest [s] */
+    hf_real first_step;     /* norm of the first change of the readings; 0 before */
+    hf_real first_size;     /* norm of the readings before it */
     bool is_tared;         /* the baseline is frozen */
     int64_t n_tared;       /* samples in the baseline so far */
     hf_real squared_steps; /* sum of squared steps of the force, while the noise is measured */

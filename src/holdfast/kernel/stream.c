@@ -169,11 +169,7 @@ static void hf_note_life(const hf_finger *f, const hf_scan *scan, double time)
     hf_note_constant(f, scan);
     if (was_dead && s->is_alive && s->n_seen > 0 && hf_are_moving(f) &&
         (tare == HOLDFAST_TARE_SECONDS || tare == HOLDFAST_TARE_FIRST)) {
-        memset(s, 0, sizeof *s);
-        hf_begin_finger(f);
-        hf_fill(f->baseline, 3 * f->n, 0);
-        s->last_time = time;
-        s->is_alive = true;
+        hf_begin_again(f, time);
     }
 }
 
@@ -197,10 +193,15 @@ static int32_t hf_process(const hf_finger *f, double time)
         hf_hold_lost(f);
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
+    const bool are_valid = hf_are_valid(f, &scan);
+    if (s->zero != HF_CONFIRMED && are_valid) {
+        hf_confirm_zero(f, time);
+    }
     holdfast_taxel_set jumps = {{0}};
-    /* After a gap the last sample is too old to show a jump. */
-    const bool has_jumps = !after_gap && hf_find_jumps(f, &scan, &jumps);
-    if (has_jumps || !hf_are_valid(f, &scan)) {
+    /* After a gap the last sample is too old to show a jump, and a first one may be no reading. */
+    const bool is_compared = !after_gap && (s->n_seen > 1 || s->zero == HF_CONFIRMED);
+    const bool has_jumps = is_compared && hf_find_jumps(f, &scan, &jumps);
+    if (has_jumps || !are_valid) {
         if (!hf_replace_or_refuse(f, &scan, has_jumps ? &jumps : NULL)) {
             s->n_stretch = 0;
             hf_note_constant(f, &scan);

@@ -165,6 +165,8 @@ class Finger:
     def __init__(self, sensor, part, window, tare, period, ignored=()):
         self.arguments = sensor, part, window, tare, period, ignored
         self.unchanged, self.alive = [], False
+        self.zero, self.provisional_end = "provisional", math.inf
+        self.first_step = self.first_size = 0.0
         self.used = [i for i in range(sensor.n_taxels) if i not in ignored]
         self.taxels = {i: Taxel(min(1, period / 0.25)) for i in self.used}
         self.rotations = sensor.rotations[self.used]
@@ -236,10 +238,54 @@ class Finger:
         self.alive |= rests and not readings.any()
         self.unchanged.append(readings.copy())
         if dead and self.alive and self.samples and self.kind in ("seconds", "first"):
-            changed = (self.samples[-1][1] != readings).any(axis=1).sum()
-            if len(self.used) >= 4 and changed >= 0.8 * len(self.used):
-                self.__init__(*self.arguments)
-                self.last, self.alive = time, True
+            if self.are_moving(readings):
+                self.begin_again(time)
+
+    def begin_again(self, time):
+        self.__init__(*self.arguments)
+        self.last, self.alive, self.provisional_end = time, True, time + 0.5
+
+    def confirm_zero(self, readings, time):
+        """Begin again if the samples leave the first one at once, or rise from zero, for 0.5 s."""
+        if self.zero == "confirmed" or not self.fits(readings):
+            return
+        if not self.samples:
+            rests = getattr(self.sensor, "rests_at_zero", False) and not readings.any()
+            takes = self.kind in ("seconds", "first") and not rests
+            self.zero, self.provisional_end = "provisional" if takes else "confirmed", time + 0.5
+            return
+        last, end = self.samples[-1][1], self.provisional_end
+        step = float(np.linalg.norm(readings - last))
+        if self.zero == "provisional" and time <= end and not (self.first_step and step):
+            if step:
+                self.first_step, self.first_size = step, float(np.linalg.norm(last))
+            return
+        rounding = 1 / math.sqrt(12) if self.sensor.unit == "count" else 1e-6
+        least = max(step, rounding * math.sqrt(6 * len(self.used)))
+        if self.first_step > 5 * least:
+            zero = "provisional"
+        elif time <= end and (self.zero == "settles" or self.is_settling(readings, step)):
+            zero = "settles"
+        else:
+            self.zero = "confirmed"
+            return
+        self.begin_again(time)
+        self.zero, self.provisional_end = zero, end
+
+    def is_settling(self, readings, step):
+        x, d, size = self.first_size, self.first_step, float(np.linalg.norm(readings))
+        shrinks = step <= 1.5 * d and x * step <= 1.5 * d * d
+        return shrinks and size >= 0.95 * (x + d + step) and self.are_moving(readings)
+
+    def are_moving(self, readings):
+        """Whether at least four taxels in five, and four, changed since the last sample."""
+        changed = (self.samples[-1][1] != readings).any(axis=1).sum()
+        return len(self.used) >= 4 and changed >= 0.8 * len(self.used)
+
+    def fits(self, readings):
+        low, high = self.sensor.range or (-math.inf, math.inf)
+        used = readings[self.used]
+        return bool(np.isfinite(used).all() and (used >= low).all() and (used <= high).all())
 
     def take_living(self, time, given):
         readings = np.zeros_like(given)
@@ -252,9 +298,11 @@ class Finger:
         for i in self.lost:
             readings[i] = 0.0 if low < 0 < high else (low + high) / 2
             self.taxels[i].at = self.n_news
+        self.confirm_zero(readings, time)
         bad = {i for i in self.used if not np.isfinite(readings[i]).all()}
         outside = {i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()} - bad
-        jumps = set() if fresh else self.jumps(readings)
+        first = self.zero != "confirmed" and len(self.samples) < 2
+        jumps = set() if fresh or first else self.jumps(readings)
         if bad or outside or jumps:
             faults |= {"invalid"} if jumps else set()
             faults |= {"not_finite"} if bad else set()
@@ -264,6 +312,7 @@ class Finger:
                 self.lose(faults, invalid)
                 self.watch_life(readings, time)
                 return self.refuse(faults, invalid)
+            raw = readings.copy()
             for i in bad | outside | jumps:
                 readings[i] = self.samples[-1][1][i]
                 self.taxels[i].at = self.n_news
@@ -274,7 +323,7 @@ class Finger:
                 if not (known or enough):
                     self.mask.unweighed |= masked
             if not enough:
-                self.watch_life(readings, time)
+                self.watch_life(raw, time)
                 return self.refuse(faults, invalid)
         self.watch_life(readings, time)
         if implausible := self.implausible(readings):
@@ -422,7 +471,7 @@ class Finger:
             near = (used < low + 0.01 * size) | (used > high - 0.01 * size)
             if 2 * near.any(axis=1).sum() > len(used):
                 faults.add("saturated")
-        if self.baseline is not None:
+        if self.baseline is not None and self.zero == "confirmed":
             if self.rest_readings is None:
                 self.rest_readings = used if self.kind == "none" else self.baseline[self.used]
             weights = np.array([1, math.sqrt(2) / 1.5, math.sqrt(3) / 1.6])
