@@ -11,17 +11,23 @@
 #define HF_CONTACT_RELEASE_RATIO ((hf_real)0.7)
 /* Time constant with which the rest follows the force of a finger without contact [s]. With 2 s it
  * follows all that is slower than a touch, and no drift is left to report; with 5 s a grasp has
- * half as many changes again (docs/study/tries.md). */
+ * half as many changes again (docs/study/tries.md). A load lasts over the same time. */
 #define HF_FOLLOW_SECONDS ((hf_real)3)
 /* Share of the largest load so far that a touch exceeds: a contact begins above 0.12 of it, and
  * ends below 0.08, the echo that a released skin may still show (motion.c). */
 #define HF_TOUCH_SHARE ((hf_real)1.5 * HF_RELEASED_SHARE)
+/* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
+ * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
+#define HF_REST_SECONDS 0.2
 /* A force is unsteady while it changes within 0.133 s by more than a quarter of the largest load of
  * the last seconds, and by 16 times its noise. The noise of such a change is 5 standard deviations
  * of a white one times 2.3, the most that was measured on a real sensor; with 10 times, a gripper
  * that held still had 4.5 alarms a minute (decision 12). */
 #define HF_UNSTEADY_SHARE ((hf_real)0.25)
 #define HF_UNSTEADY_TO_NOISE ((hf_real)16)
+/* A first touch shows turned taxels by at least this share of the squared normal readings of either
+ * sign. */
+#define HF_TURNED_SHARE ((hf_real)0.2)
 /* A finger is calm while sigma is at most this many times the sigma of noise alone. */
 #define HF_CALM_RATIO ((hf_real)3)
 
@@ -45,20 +51,16 @@ static bool hf_is_unloaded(
     return load < hf_max(threshold, HF_TOUCH_SHARE * peak);
 }
 
-/* Return whether the load of relative features is below the threshold of contact, or an echo.
+/* Return whether a load is what a grip that was let go leaves. Update the load that lasted.
  *
- * A skin that was let go creeps, and its tare has drifted since: the peak is forgotten faster than
- * what is left goes. So a load that falls in one motion has a larger share of it, and what it left
- * is no touch until it rises again. */
-static bool hf_is_echo(
-    const hf_finger *f, const holdfast_decision *d, hf_real load, hf_real peak, hf_real threshold)
+ * A skin creeps back from a load that lasted, and its tare has drifted since: the peak is forgotten
+ * sooner than what is left goes. */
+static bool hf_is_echo(const hf_finger *f, holdfast_decision *d, hf_real load)
 {
-    /* In contact: load < 0.12 of that of the motion; else the echo has 0.08 of a peak at least. */
-    if (hf_was_in_contact(d)) {
-        return hf_is_unloaded(d, load, peak, threshold) ||
-               load < HF_TOUCH_SHARE * f->state->motion.moving_load;
-    }
-    return hf_is_unloaded(d, load, hf_max(peak, d->echo / HF_RELEASED_SHARE), threshold);
+    /* s(k) = s(k-1) + (T / tau) (load(k) - s(k-1)). In contact: load < 0.12 s. */
+    d->smoothed = isnan(d->smoothed) ? load : d->smoothed;
+    d->smoothed += hf_min(1, f->hand->period / HF_FOLLOW_SECONDS) * (load - d->smoothed);
+    return hf_was_in_contact(d) && load < HF_TOUCH_SHARE * d->smoothed;
 }
 
 /* Return how far the normal force fell below that of the first sample. */
@@ -71,6 +73,26 @@ static hf_real hf_fall(const hf_real rest[3], const hf_real normal[3])
     return fall;
 }
 
+/* Find at the first touch whether taxels are turned: their normal readings rise at some taxels and
+ * fall at others as much, as those of magnets of alternating poles, so that F vanishes. */
+static void hf_find_poles(const hf_finger *f)
+{
+    /* Touch: sum |g_i|^2 > (100 noise)^2. With p_i = g_i . n: the sum of p_i^2 that rise and that of
+     * those that fall are at least a fifth of both, and |F|^2 < sum |g_i|^2, as of one taxel. */
+    holdfast_motion *const m = &f->state->motion;
+    const hf_real touch = HF_NOISE_WEIGHT * m->taxel_noise;
+    if (isinf(m->least_taxel_noise) || m->taxel_load <= touch) {
+        return;
+    }
+    const size_t now = (size_t)((m->n_samples - 1) % (int64_t)HF_N_TRACK(f->hand));
+    const hf_normal_sums sums = hf_sum_normals(f, now);
+    if (sums.all > touch * touch) {
+        const hf_real fallen = sums.squares - sums.risen_squares;
+        const bool both = hf_min(sums.risen_squares, fallen) >= HF_TURNED_SHARE * sums.squares;
+        m->poles = both && hf_square(f->track[now].force) < sums.all ? HF_OPPOSED : HF_ALIKE;
+    }
+}
+
 /* Return what the load of relative features shows, and whether the force rests. */
 static int hf_contact_by_load(
     const hf_finger *f, holdfast_decision *d, hf_real limit, bool zero_unknown, double time)
@@ -79,31 +101,40 @@ static int hf_contact_by_load(
      * without motion, or once all taxels read what they did in the tare; and ends with the load
      * alone. */
     const holdfast_motion *const m = &f->state->motion;
-    const hf_real threshold = limit * m->noise;
+    if (m->poles == HF_FIRST_TOUCH && !zero_unknown && f->hand->tare_kind != HOLDFAST_TARE_NONE) {
+        hf_find_poles(f);
+    }
+    const hf_real noise = m->poles == HF_OPPOSED ? m->taxel_noise : m->noise;
+    const hf_real threshold = limit * noise;
     hf_real peak = m->peak_contact_load;
     /* The tare holds a load that is not known. It shows when it goes: as the fall of the normal
      * force, once that is clearly above the noise. Until then there may be contact. */
     if (zero_unknown) {
         const hf_real fall = hf_fall(m->contact_zero, f->finger->normal);
-        if (fall < HF_NOISE_WEIGHT * m->noise) {
+        if (fall < HF_NOISE_WEIGHT * noise) {
             return HF_IN_CONTACT;
         }
         peak = hf_max(peak, fall);
     }
-    if (!hf_is_echo(f, d, m->contact_load, peak, threshold)) {
+    /* What a release leaves is no touch until it rises by half: its peak is at least echo / 0.08. */
+    const hf_real load = m->contact_load;
+    const hf_real of_echo = hf_was_in_contact(d) ? 0 : d->echo / HF_RELEASED_SHARE;
+    const bool is_echo = hf_is_echo(f, d, load);
+    const bool is_small = hf_is_unloaded(d, load, hf_max(peak, of_echo), threshold);
+    if (!is_small && !is_echo) {
         d->loaded_at = time;
         /* Unsteady: |F(k) - F(k - 0.133 s / T)| > max(peak / 4, 16 noise). */
-        const hf_real least = hf_max(HF_UNSTEADY_SHARE * peak, HF_UNSTEADY_TO_NOISE * m->noise);
+        const hf_real least = hf_max(HF_UNSTEADY_SHARE * peak, HF_UNSTEADY_TO_NOISE * noise);
         return m->moved_by > least ? HF_UNSTEADY : HF_IN_CONTACT;
     }
     const double last = d->loaded_at > m->moved_at ? d->loaded_at : m->moved_at;
     if (d->candidate == HOLDFAST_NO_CONTACT || f->state->is_untouched ||
         time - last > HF_REST_SECONDS) {
-        d->echo = hf_was_in_contact(d) ? m->contact_load : hf_min(d->echo, m->contact_load);
+        d->echo = hf_was_in_contact(d) ? load : hf_min(d->echo, load);
         return HF_WITHOUT_CONTACT;
     }
     /* A grip was seen: peak >= 100 noise. A stream may begin in contact undeclared. */
-    return peak >= HF_NOISE_WEIGHT * m->noise ? HF_UNSTEADY : HF_IN_CONTACT;
+    return is_small && peak < HF_NOISE_WEIGHT * noise ? HF_IN_CONTACT : HF_UNSTEADY;
 }
 
 /* Return what F_a shows, and whether a share of it rests.

@@ -29,9 +29,6 @@
 #define HF_NOISE_WEIGHT ((hf_real)100)
 /* Share of the largest load that a released skin may still show. */
 #define HF_RELEASED_SHARE ((hf_real)0.08)
-/* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
- * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
-#define HF_REST_SECONDS 0.2
 
 /* Faults of a finger whose samples no window may hold, though they have a force. */
 enum { HF_SERIOUS = HOLDFAST_STUCK | HOLDFAST_NOISY };
@@ -209,6 +206,14 @@ typedef struct {
     hf_real top;         /* largest |d_i|^2 of the taxels with p_i > mean p; 0 without any */
 } hf_second_sums;
 
+/* Sums over the normal parts p_i = g_i . n of the taxels. */
+typedef struct {
+    hf_real risen;         /* sum max(p_i, 0) */
+    hf_real risen_squares; /* sum max(p_i, 0)^2 */
+    hf_real squares;       /* sum p_i^2 */
+    hf_real all;           /* sum |g_i|^2 */
+} hf_normal_sums;
+
 /* taxels.c */
 HF_SHARED hf_real hf_sum_taxels(const hf_finger *f, const hf_real *baseline, hf_real force[3]);
 HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t before);
@@ -216,7 +221,7 @@ HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3]);
 HF_SHARED hf_residual
 hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3]);
 HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at);
-HF_SHARED hf_real hf_risen(const hf_finger *f, size_t now);
+HF_SHARED hf_normal_sums hf_sum_normals(const hf_finger *f, size_t now);
 
 /* Mean and spread of a window. */
 typedef struct {
@@ -268,6 +273,9 @@ HF_SHARED void hf_lose_taxels(
     const hf_finger *f, uint32_t faults, const holdfast_taxel_set *invalid);
 HF_SHARED bool hf_replace_invalid(const hf_finger *f, const holdfast_taxel_set *invalid);
 HF_SHARED bool hf_mask_taxels(const hf_finger *f, const holdfast_taxel_set *faulty, double time);
+
+/* How the normal readings of the taxels change in the first touch (motion.c). */
+enum { HF_FIRST_TOUCH, HF_ALIKE, HF_OPPOSED };
 
 /* motion.c. Not inline: gcc computes them 4 % slower as a part of their caller. */
 HF_SHARED HF_APART hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3]);

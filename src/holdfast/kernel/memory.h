@@ -62,13 +62,13 @@ typedef struct {
     double block_start;        /* [s]; NaN before the first sample */
     double moved_at;           /* when the force last moved by much more than its noise [s] */
     hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
-    hf_real moving_load;       /* largest load beyond contact_zero since it began to move */
     hf_real pressure;          /* sum of |h_i . n| over the taxels */
     hf_real pressure_squares;  /* sum of their squares */
     hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
     hf_real tangent[3];        /* direction of the tangential force */
     hf_real contact_zero[3];   /* F_tip without contact: of the tare, or of a release since */
-    hf_real contact_load;      /* force beyond contact_zero */
+    int32_t poles;             /* whether the normal readings have opposite signs in a touch */
+    hf_real contact_load;      /* force beyond contact_zero, or of the taxels */
     hf_real peak_contact_load; /* the largest so far, slowly forgotten */
 } holdfast_motion;
 
@@ -201,7 +201,7 @@ typedef struct {
     hf_real probability;      /* of stability; NaN without an estimate */
     double candidate_since;   /* [s] */
     double last_unstable;     /* last sample that was unstable before the hold time [s] */
-    hf_real smoothed;         /* F_a, smoothed over 1 s; NaN before */
+    hf_real smoothed;         /* F_a over 1 s, or the load over 3 s; NaN before */
     double restless_at;       /* when the finger was last not calm [s] */
     hf_real rest[3];          /* F_tip without contact, beyond the tare */
     hf_real peak;             /* largest load so far, slowly forgotten */

@@ -206,7 +206,7 @@ static bool hf_is_release(const hf_finger *f, size_t now, hf_real normal)
     if (normal * normal < HF_LEAST_FALL * HF_LEAST_FALL * square) {
         return false;
     }
-    const hf_real risen = hf_risen(f, now);
+    const hf_real risen = hf_sum_normals(f, now).risen;
     return risen <= HF_RELEASED_SHARE * (risen - normal);
 }
 
@@ -228,16 +228,16 @@ static void hf_update_contact_load(const hf_finger *f, size_t now, hf_real keep)
             m->contact_zero[axis] = force[axis];
         }
     }
-    /* load = |F - zero|, peak as above. */
+    /* load = |F - zero|, or sqrt(sum |g_i|^2) of taxels that are turned; peak as above. */
     hf_real beyond[3];
     hf_beyond(force, m->contact_zero, beyond);
-    m->contact_load = hf_sqrt(hf_square(beyond));
+    const bool opposed = m->poles == HF_OPPOSED;
+    m->contact_load = hf_sqrt(opposed ? hf_sum_normals(f, now).all : hf_square(beyond));
     m->peak_contact_load = hf_max(m->contact_load, keep * m->peak_contact_load);
 }
 
 /* Note how far the force moved, and when: by much more than its noise, and than an echo. */
-static void hf_update_movement(
-    const hf_finger *f, size_t now, size_t n_before, hf_real keep, double time)
+static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, double time)
 {
     holdfast_motion *const m = &f->state->motion;
     /* moved = |F(k) - F(k - MOVE_SECONDS / T)| > max(5 noise, 0.08 peak): the force moves. */
@@ -249,15 +249,9 @@ static void hf_update_movement(
     hf_real change[3];
     hf_force_between(f, hf_index_before(f, now, back), now, change);
     m->moved_by = hf_sqrt(hf_square(change));
-    bool is_at_rest = time - m->moved_at > HF_REST_SECONDS;
     if (m->moved_by > hf_max(HF_MOVED_TO_NOISE * m->noise, HF_RELEASED_SHARE * m->peak_load)) {
-        m->moving_load = is_at_rest ? 0 : m->moving_load; /* a motion begins */
         m->moved_at = time;
-        is_at_rest = false;
     }
-    /* The largest load of the motion, which is forgotten like the peak once the force rests. */
-    m->moving_load =
-        is_at_rest ? keep * m->moving_load : hf_max(m->contact_load, m->moving_load);
 }
 
 /* Update the tangent, and the ratio of tangential to normal force. */
@@ -421,7 +415,7 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     hf_update_noise(f, time);
     hf_update_load(f, now, keep);
     hf_update_contact_load(f, now, keep);
-    hf_update_movement(f, now, n_before, keep, time);
+    hf_update_movement(f, now, n_before, time);
     if (hand->has_ratios) {
         hf_update_ratio(f, now);
     }

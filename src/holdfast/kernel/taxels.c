@@ -199,20 +199,30 @@ HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
     return sums;
 }
 
-/* Return the sum of max(g_i . n, 0) over the taxels at an index of the ring. */
-HF_SHARED hf_real hf_risen(const hf_finger *f, size_t now)
+/* Return sums over the normal parts p_i = g_i . n at an index of the ring. */
+HF_SHARED hf_normal_sums hf_sum_normals(const hf_finger *f, size_t now)
 {
     const size_t n = f->n;
     const hf_real *const ring = hf_forces_at(f, now);
-    hf_sum risen;
+    hf_sum risen, risen_squares, squares, all;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide part = {0};
+        hf_wide part = {0}, up = {0}, both = {0}, whole = {0};
         const hf_wide none = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
-            const hf_wide pressed = hf_along(hf_load_vectors(ring, n, i), f->finger->normal);
-            part += hf_greater(pressed, none);
+            const hf_vectors g = hf_load_vectors(ring, n, i);
+            const hf_wide pressed = hf_along(g, f->finger->normal);
+            const hf_wide above = hf_greater(pressed, none);
+            part += above;
+            up += above * above;
+            both += pressed * pressed;
+            whole += hf_squares(g);
         }
         hf_put(&risen, lane, part);
+        hf_put(&risen_squares, lane, up);
+        hf_put(&squares, lane, both);
+        hf_put(&all, lane, whole);
     }
-    return hf_total(risen);
+    const hf_normal_sums sums = {
+        hf_total(risen), hf_total(risen_squares), hf_total(squares), hf_total(all)};
+    return sums;
 }
