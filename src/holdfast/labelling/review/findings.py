@@ -49,6 +49,7 @@ FindingKind = Literal[
     "held",
     "invalid",
     "stuck",
+    "turned",
 ]
 
 
@@ -95,6 +96,11 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
         text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
+    found += [
+        Finding(name, "turned", _turned_text((module.turned + 1).tolist()))
+        for name, module in scan.modules.items()
+        if module.turned is not None and module.turned.size
+    ]
     with suppress(HoldfastError):  # no sample for the tare
         if not hand_force(scan.recording).n_touching.any():
             text = "no finger is in contact in the whole recording"
@@ -167,6 +173,14 @@ def report_hidden_labels(paths: Sequence[Path], report: Callable[[str], None]) -
         )
 
 
+def _turned_text(taxels: Sequence[int]) -> str:
+    return (
+        f"z of taxel{'s' if len(taxels) > 1 else ''} {', '.join(map(str, taxels))} falls in the "
+        "first touch while that of others rises: magnets of alternating poles? builtin:any finds "
+        "contact by all taxels; turn them in the sensor file (rotations)"
+    )
+
+
 def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
     low, high = RELATIVE_RATES
     rate = module.force.rate / module.rows_per_update
@@ -218,7 +232,7 @@ DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
     "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel", "turned",
     "many_taxels", "no_contact", "no_labels",
 )  # fmt: skip
 
