@@ -77,8 +77,8 @@ static hf_real hf_fall(const hf_real rest[3], const hf_real normal[3])
  * fall at others as much, as those of magnets of alternating poles, so that F vanishes. */
 static void hf_find_poles(const hf_finger *f)
 {
-    /* Touch: sum |g_i|^2 > (100 noise)^2. With p_i = g_i . n: the sum of p_i^2 that rise and that of
-     * those that fall are at least a fifth of both, and |F|^2 < sum |g_i|^2, as of one taxel. */
+    /* Touch: sum |g_i|^2 > (100 noise)^2. With p_i = g_i . n: the sum of p_i^2 that rise, and that
+     * of those that fall, are a fifth of both at least, and |F|^2 < sum |g_i|^2, as of one. */
     holdfast_motion *const m = &f->state->motion;
     const hf_real touch = HF_NOISE_WEIGHT * m->taxel_noise;
     if (isinf(m->least_taxel_noise) || m->taxel_load <= touch) {
@@ -101,7 +101,8 @@ static int hf_contact_by_load(
      * without motion, or once all taxels read what they did in the tare; and ends with the load
      * alone. */
     const holdfast_motion *const m = &f->state->motion;
-    if (m->poles == HF_FIRST_TOUCH && !zero_unknown && f->hand->tare_kind != HOLDFAST_TARE_NONE) {
+    const bool is_tared = !zero_unknown && f->hand->tare_kind != HOLDFAST_TARE_NONE;
+    if (m->poles == HF_FIRST_TOUCH && is_tared) {
         hf_find_poles(f);
     }
     const hf_real noise = m->poles == HF_OPPOSED ? m->taxel_noise : m->noise;
@@ -116,7 +117,7 @@ static int hf_contact_by_load(
         }
         peak = hf_max(peak, fall);
     }
-    /* What a release leaves is no touch until it rises by half: its peak is at least echo / 0.08. */
+    /* What a release leaves is no touch until it rises by half: peak >= echo / 0.08. */
     const hf_real load = m->contact_load;
     const hf_real of_echo = hf_was_in_contact(d) ? 0 : d->echo / HF_RELEASED_SHARE;
     const bool is_echo = hf_is_echo(f, d, load);

@@ -189,8 +189,8 @@ typedef struct {
 
 /* What is remembered of the decisions about a finger. Times are NaN where there was none.
  *
- * Who changes it: contact.c excess, smoothed, restless_at, rest, peak, shaken_at, loaded_at and echo;
- * heads.c scores and all about slips; decision.c the rest. */
+ * Who changes it: contact.c excess, all from smoothed to echo; heads.c scores and all about slips;
+ * decision.c the rest. */
 typedef struct {
     int32_t state;            /* that is reported */
     int32_t candidate;        /* of the last sample; may not have lasted long enough yet */

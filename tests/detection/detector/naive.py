@@ -237,9 +237,9 @@ class Finger:
         self.alive = bool(self.unchanged and (readings != self.unchanged[-1]).any())
         self.alive |= rests and not readings.any()
         self.unchanged.append(readings.copy())
-        if dead and self.alive and self.samples and self.kind in ("seconds", "first"):
-            if self.are_moving(readings):
-                self.begin_again(time)
+        takes = self.kind in ("seconds", "first")
+        if dead and self.alive and self.samples and takes and self.are_moving(readings):
+            self.begin_again(time)
 
     def begin_again(self, time):
         self.__init__(*self.arguments)
