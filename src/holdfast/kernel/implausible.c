@@ -14,6 +14,8 @@
 /* A jump of one taxel alone by this many times its noise is implausible until it stays there for a
  * second sample: a touch spreads over the skin. */
 #define HF_JUMP_TO_NOISE ((hf_real)50)
+/* A jump of one taxel alone by this many times what all others have shown stays implausible. */
+#define HF_JUMP_TO_SHOWN ((hf_real)20)
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
 
@@ -185,6 +187,16 @@ static hf_steps hf_find_steps(const hf_finger *f)
     return steps;
 }
 
+/* Note how far all taxels but one have moved at once, at a sample that is valid. */
+static void hf_note_shown(const hf_finger *f, const hf_scan *scan, const hf_steps *steps)
+{
+    const hf_real others = steps->total - steps->largest;
+    if (others > f->state->shown && scan->least >= f->finger->low &&
+        scan->most <= f->finger->high && others < HF_INFINITY) {
+        f->state->shown = others;
+    }
+}
+
 /* Return whether a taxel reads zeros in all axes. */
 static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
 {
@@ -195,16 +207,80 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
     return has_zeros;
 }
 
-/* Find the magnetometers that read zeros, or jump alone, at this sample. Return whether there are
- * any. `jumps` is empty before. */
+/* Return whether a jump is one that no touch makes, so that it stays if the next sample agrees.
+ *
+ * others: sum of the squared steps of all others; calm: squared step of one of them, or of noise;
+ * quiet: sum of the squared steps of all others while they are at rest. */
+static bool hf_is_offset(
+    const hf_finger *f, const hf_real jump[3], hf_real others, hf_real calm, hf_real quiet)
+{
+    /* |df_i| > 20 sqrt(max sum |df_j|^2 of all others so far). A magnetic skin spreads each touch;
+     * on other skins the first may be that of one taxel, which shows nothing. */
+    const hf_real square = hf_square(jump), shown = hf_max(f->state->shown, others);
+    if ((f->finger->is_magnetic || shown > quiet) && f->finger->n_used > HF_MIN_TAXELS &&
+        square > HF_JUMP_TO_SHOWN * HF_JUMP_TO_SHOWN * hf_max(shown, quiet)) {
+        return true;
+    }
+    /* A byte was lost: 256 or 65536 steps along one axis, to 3 sqrt(calm), a tenth of it at most.
+     * False where the step is not known. */
+    const hf_real limit = 9 * calm;
+    for (size_t axis = 0; axis < 3; ++axis) {
+        const hf_real size = hf_abs(jump[axis]), across = square - size * size;
+        const hf_real whole = (size > 4096 * f->finger->step ? 65536 : 256) * f->finger->step;
+        if (100 * limit <= whole * whole && (size - whole) * (size - whole) + across <= limit) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Subtract from the readings the jumps that stay. They are named and masked until they go back. */
+HF_SHARED void hf_take_out_jumps(const hf_finger *f)
+{
+    holdfast_finger_memory *const s = f->state;
+    s->has_offsets = false;
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        hf_real *const jump = f->masks[i].jump, square = hf_square(jump);
+        hf_real step[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const size_t index = axis * f->n + i;
+            step[axis] = f->readings[index] - f->previous[index] - jump[axis];
+        }
+        if (hf_has(&s->offset_taxels, i)) {
+            /* A step by half of the jump is another one. It went back if half of it is left. */
+            const bool jumps = hf_square(step) > square / 4;
+            for (size_t axis = 0; axis < 3 && jumps; ++axis) {
+                jump[axis] += step[axis];
+            }
+            if (jumps && hf_square(jump) <= square / 4) {
+                hf_remove(&s->offset_taxels, i);
+                continue;
+            }
+        } else if (square > 0 && hf_has(&s->jumped, i) && 100 * hf_square(step) <= square) {
+            hf_include(&s->offset_taxels, i); /* a touch goes on to move */
+        } else {
+            continue;
+        }
+        s->has_offsets = true;
+        for (size_t axis = 0; axis < 3; ++axis) {
+            f->readings[axis * f->n + i] -= jump[axis];
+        }
+    }
+}
+
+/* Find the magnetometers that read zeros at this sample, and the taxels that jump alone. Return
+ * whether there are any. `jumps` is empty before. */
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps)
 {
     holdfast_finger_memory *const s = f->state;
-    if (!f->finger->is_magnetic || s->n_seen == 0) {
+    if (s->n_seen == 0) {
         return false;
     }
     hf_steps steps = hf_find_steps(f);
-    if (steps.largest < HF_LONE_SHARE * steps.total && !hf_has_zeros(f, scan)) {
+    const bool is_magnetic = f->finger->is_magnetic;
+    const bool is_lone = steps.largest >= HF_LONE_SHARE * steps.total;
+    if (!is_lone && !(is_magnetic && hf_has_zeros(f, scan))) {
+        hf_note_shown(f, scan, &steps);
         hf_clear(&s->jumped);
         return false;
     }
@@ -215,7 +291,7 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     hf_real of_noise = isnan(s->noise) ? 0 : 6 * s->noise * s->noise / f->finger->n_used;
     bool has_zeros = false;
     hf_real n_others = f->finger->n_used;
-    for (size_t i = 0; i < f->n_taxels; ++i) {
+    for (size_t i = 0; i < f->n_taxels && is_magnetic; ++i) {
         if (f->used[i] > 0 && !hf_has_reading(f->readings, n, i)) {
             const hf_real *const then = f->previous + i;
             const hf_real fallen[3] = {then[0], then[n], then[2 * n]};
@@ -224,8 +300,10 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
             has_zeros |= hf_square(fallen) > 0;
         }
     }
+    const hf_real others = hf_max(0, steps.total - steps.largest);
+    const hf_real each = others / hf_max(n_others - 1, 1);
     if (isnan(s->noise) && !has_zeros) {
-        of_noise = hf_max(0, steps.total - steps.largest) / hf_max(n_others - 1, 1);
+        of_noise = each;
     }
     /* Zero: |f_i(k-1)|^2 > (20)^2 max(mean |df|^2 of the others, of noise). */
     const hf_real typical = hf_max(of_noise, hf_max(0, steps.total) / hf_max(n_others, 1));
@@ -241,17 +319,32 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
     /* Jump: |df_i|^2 > (50)^2 of noise, and the others' mean |df|^2 <= (3)^2 of noise. Their sum is
      * at most `quiet`, so a taxel beyond it is the one that jumps. */
     const hf_real quiet = HF_QUIET_STEPS * HF_QUIET_STEPS * of_noise * (n_others - 1);
-    if (steps.largest > HF_JUMP_TO_NOISE * HF_JUMP_TO_NOISE * of_noise && of_noise > 0 &&
-        n_others >= HF_MIN_TAXELS && steps.total - steps.largest <= quiet) {
-        for (size_t i = 0; i < f->n_taxels; ++i) {
-            hf_real step[3];
-            for (size_t axis = 0; axis < 3; ++axis) {
-                step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
-            }
-            if (!hf_has(jumps, i) && !hf_has(&before, i) && hf_square(step) > quiet) {
-                hf_include(&s->jumped, i); /* at its second sample, a jump is plausible */
-            }
+    const bool is_loud = is_magnetic && n_others >= HF_MIN_TAXELS && of_noise > 0 &&
+                         steps.largest > HF_JUMP_TO_NOISE * HF_JUMP_TO_NOISE * of_noise &&
+                         others <= quiet;
+    const hf_real least = is_loud ? quiet : steps.largest / 2;
+    for (size_t i = 0; (is_loud || is_lone) && i < f->n_taxels; ++i) {
+        hf_real step[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            step[axis] = f->readings[axis * n + i] - f->previous[axis * n + i];
         }
+        if (hf_has(jumps, i) || hf_has(&before, i) || !(hf_square(step) > least)) {
+            continue; /* at its second sample, a jump is plausible */
+        }
+        const bool stays = is_lone && !hf_has(&s->offset_taxels, i) &&
+                           hf_is_offset(f, step, others, hf_max(of_noise, each), quiet);
+        if (is_loud || stays) {
+            hf_include(&s->jumped, i);
+        }
+        if (stays) {
+            memcpy(f->masks[i].jump, step, sizeof step);
+            s->has_offsets = true;
+        } else if (!hf_has(&s->offset_taxels, i)) {
+            hf_fill(f->masks[i].jump, 3, 0);
+        }
+    }
+    if (hf_is_empty(f, &s->jumped)) {
+        hf_note_shown(f, scan, &steps);
     }
     hf_unite(f, jumps, &s->jumped);
     return !hf_is_empty(f, jumps);

@@ -24,6 +24,7 @@ typedef struct {
 typedef struct {
     hf_real last_healthy[3]; /* reading beyond rest when the mask last changed */
     hf_real fade[3];         /* is added to the reading of a taxel that came back */
+    hf_real jump[3];         /* by which the reading is off since a jump (implausible.c) */
     double masked_at;        /* time from which it is left out [s] */
     bool unweighed;          /* it is left out, and its share of the load is not known */
 } holdfast_mask;
@@ -126,6 +127,9 @@ typedef struct {
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
     /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
+    holdfast_taxel_set offset_taxels; /* taxels whose jump stays */
+    bool has_offsets;          /* there are some, or a jump of the last sample that may stay */
+    hf_real shown;             /* most that all taxels but one moved at once: sum of squares */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
     uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
     uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */

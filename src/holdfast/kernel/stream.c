@@ -196,6 +196,13 @@ static int32_t hf_process(const hf_finger *f, double time)
     if (s->lost_faults) {
         hf_hold_lost(f);
     }
+    if (s->has_offsets) {
+        hf_take_out_jumps(f);
+        if (s->has_offsets) {
+            v->faults |= HOLDFAST_INVALID;
+            hf_unite(f, &v->taxels, &s->offset_taxels);
+        }
+    }
     hf_scan scan = hf_scan_readings(f, f->readings);
     holdfast_taxel_set jumps = {{0}};
     /* After a gap the last sample is too old to show a jump. */
