@@ -255,6 +255,9 @@ HF_SHARED void hf_take_out_jumps(const hf_finger *f);
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
 HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan);
 
+HF_SHARED uint32_t hf_follow_rezero(const hf_finger *f, double time);
+HF_SHARED bool hf_touches_rezeroed(const hf_finger *f);
+
 /* tare.c */
 HF_SHARED bool hf_update_tare(const hf_finger *f, hf_real elapsed);
 

@@ -156,7 +156,8 @@ enum {
     HOLDFAST_OFFSET = 8192,     /* all readings have left the tare together */
     HOLDFAST_REPEATED = 16384,  /* the last samples repeat those before them */
     HOLDFAST_FIELD = 32768,     /* a magnetic field, or a load: all taxels changed nearly alike */
-    HOLDFAST_INVALID = 65536    /* a reading of one taxel that it cannot have: it jumped */
+    HOLDFAST_INVALID = 65536,   /* a reading of one taxel that it cannot have: it jumped */
+    HOLDFAST_REZEROED = 524288   /* all readings of a hold went to rest at once: a new baseline? */
 };
 
 /* How the baseline is found. */

@@ -19,6 +19,15 @@
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
 
+/* A hold has at least this many steps of its readings, where they are known, and changes by at most
+ * this share of itself over the window of sigma. */
+#define HF_HELD_STEPS ((hf_real)20)
+#define HF_HELD_CHANGE ((hf_real)0.5)
+/* Time for which it is not known whether a finger without readings still holds [s]. */
+#define HF_REZEROED_SECONDS ((hf_real)0.5)
+/* Share of the lost force within which a force is that force. */
+#define HF_SAME_FORCE ((hf_real)0.25)
+
 enum {
     HF_MIN_PERIOD = 3,   /* of a ring: the shortest [samples] */
     HF_LONG_PERIOD = 12, /* the first of the long ones */
@@ -375,4 +384,86 @@ HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan)
         faults |= HOLDFAST_OUT_OF_RANGE;
     }
     return faults;
+}
+
+/* Return whether the readings of a hold went to those of the tare within one sample. */
+static bool hf_goes_to_rest(const hf_finger *f)
+{
+    const holdfast_finger_memory *const s = f->state;
+    const size_t window = f->finger->sigma_window;
+    const hf_real *const before = hf_history(f, 1);
+    if (f->values->amplitude > HF_RELEASED_SHARE * before[0] || s->n_stretch < (int64_t)window) {
+        return false;
+    }
+    /* Held: |F(k-1)| >= 100 noise, and |F(k-1) - F(k - N_w + 1)| <= 1/2 |F(k-1)|: a hand that lets
+     * go takes some samples. */
+    const hf_real *const first = hf_history(f, window - 1);
+    hf_real change[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        change[axis] = before[1 + axis] - first[1 + axis];
+    }
+    const hf_real most = HF_HELD_CHANGE * before[0];
+    hf_real least = HF_NOISE_WEIGHT * s->noise;
+    least = f->finger->step > 0 ? hf_max(least, HF_HELD_STEPS * f->finger->step) : least;
+    if (!(before[0] >= least && hf_square(change) <= most * most)) {
+        return false;
+    }
+    /* At rest: sum |f_i - b_i|^2 <= 4 times that of noise + (0.08 |F(k-1)|)^2 / n. */
+    hf_sum squares = {{0}};
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        hf_real beyond[3];
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const size_t index = axis * f->n + i;
+            beyond[axis] = f->used[i] * (f->readings[index] - f->baseline[index]);
+        }
+        hf_add(&squares, i, hf_square(beyond));
+    }
+    const hf_real echo = HF_RELEASED_SHARE * before[0];
+    return hf_total(squares) <= 12 * s->noise * s->noise + echo * echo / f->finger->n_used;
+}
+
+/* Follow a finger whose readings all went to rest at once, in a hold. Return the fault of its first
+ * half second.
+ *
+ * The driver took a new baseline in the grip, or the object left within a sample: the readings
+ * cannot tell. A force that returns to what it was shows that there was neither. */
+HF_SHARED uint32_t hf_follow_rezero(const hf_finger *f, double time)
+{
+    holdfast_finger_memory *const s = f->state;
+    if (hf_goes_to_rest(f)) {
+        s->is_rezeroed = true;
+        s->rezeroed_at = time;
+        memcpy(s->lost_force, hf_history(f, 1) + 1, sizeof s->lost_force);
+        s->least_normal = 0;
+        s->n_stretch = s->motion.n_samples = 0;
+        hf_clear_values(f->values); /* UNKNOWN at once */
+        return HOLDFAST_REZEROED;
+    }
+    if (!s->is_rezeroed) {
+        return 0;
+    }
+    hf_real change[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        change[axis] = f->values->force[axis] - s->lost_force[axis];
+    }
+    s->least_normal = hf_min(s->least_normal, hf_dot(f->values->force, f->finger->normal));
+    if ((hf_real)(time - s->rezeroed_at) + f->hand->period / 2 >= HF_REZEROED_SECONDS) {
+        return 0;
+    }
+    if (hf_square(change) <= HF_SAME_FORCE * HF_SAME_FORCE * hf_square(s->lost_force)) {
+        s->is_rezeroed = false;
+        s->n_stretch = s->motion.n_samples = 0;
+    }
+    return s->is_rezeroed ? HOLDFAST_REZEROED : 0;
+}
+
+/* Return whether a finger whose readings went to rest at once is pressed again.
+ *
+ * After a new baseline, the force of an open hand is below zero by the load that was lost. */
+HF_SHARED bool hf_touches_rezeroed(const hf_finger *f)
+{
+    /* F . n - least F . n since > 0.08 |F| lost. */
+    const holdfast_finger_memory *const s = f->state;
+    const hf_real risen = hf_dot(f->values->force, f->finger->normal) - s->least_normal;
+    return risen > HF_RELEASED_SHARE * hf_sqrt(hf_square(s->lost_force));
 }

@@ -136,6 +136,11 @@ typedef struct {
     uint64_t ring_length;      /* successive samples with the sum of that a period before */
     uint64_t ring_age;         /* samples since the ring is followed */
     bool ring_varies;          /* enough readings and samples of the ring differ */
+    /* All readings went to rest at once, in a hold (implausible.c). */
+    bool is_rezeroed;       /* and nothing has touched since */
+    double rezeroed_at;     /* when [s] */
+    hf_real lost_force[3];  /* F_tip of the sample before */
+    hf_real least_normal;   /* least F_tip . n since */
     holdfast_motion motion;
     /* Readings that never changed (faults.c): last, as a living finger does not read it. */
     int64_t n_constant;   /* samples before the first that changed a reading */

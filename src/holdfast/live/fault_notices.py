@@ -83,7 +83,19 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     ),
     Fault.INVALID: FaultText(
         "invalid readings",
-        "readings jump for a single sample, or to zero: check the cable and the driver's timing",
+        "readings jump, or fall to zero: check the cable and the driver's timing",
+    ),
+    Fault.EQUAL_TAXELS: FaultText(
+        "equal taxels",
+        "taxels change and are equal all the time: check the wiring of the sensor",
+    ),
+    Fault.COPIED: FaultText(
+        "copied", "two fingers have the same readings: check the addresses of their sensors"
+    ),
+    Fault.REZEROED: FaultText(
+        "new zero",
+        "all readings fell to zero at once: the object left, or the driver took a new baseline in "
+        f"the grip; open the hand and {_NEW_TARE}",
     ),
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
