@@ -19,9 +19,9 @@
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
 
-/* A hold has at least this many steps of its readings, where they are known, and changes by at most
- * this share of itself over the window of sigma. */
-#define HF_HELD_STEPS ((hf_real)20)
+/* A hold has at least this many times the noise of the force, and the step of its readings. It
+ * changes by at most this share of itself over the window of sigma. */
+#define HF_LEAST_HOLD ((hf_real)20)
 #define HF_HELD_CHANGE ((hf_real)0.5)
 /* Time for which it is not known whether a finger without readings still holds [s]. */
 #define HF_REZEROED_SECONDS ((hf_real)0.5)
@@ -340,7 +340,9 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
         if (hf_has(jumps, i) || hf_has(&before, i) || !(hf_square(step) > least)) {
             continue; /* at its second sample, a jump is plausible */
         }
-        const bool stays = is_lone && !hf_has(&s->offset_taxels, i) &&
+        /* A sensor with a dead band jumps to and from zeros, too. */
+        const bool has_readings = hf_has_reading(f->readings, n, i) && hf_has_reading(f->previous, n, i);
+        const bool stays = is_lone && has_readings && !hf_has(&s->offset_taxels, i) &&
                            hf_is_offset(f, step, others, hf_max(of_noise, each), quiet);
         if (is_loud || stays) {
             hf_include(&s->jumped, i);
@@ -395,7 +397,7 @@ static bool hf_goes_to_rest(const hf_finger *f)
     if (f->values->amplitude > HF_RELEASED_SHARE * before[0] || s->n_stretch < (int64_t)window) {
         return false;
     }
-    /* Held: |F(k-1)| >= 100 noise, and |F(k-1) - F(k - N_w + 1)| <= 1/2 |F(k-1)|: a hand that lets
+    /* Held: |F(k-1)| >= 20 max(noise, step), and |F(k-1) - F(k - N_w + 1)| <= 1/2 |F(k-1)|: a hand that lets
      * go takes some samples. */
     const hf_real *const first = hf_history(f, window - 1);
     hf_real change[3];
@@ -403,8 +405,8 @@ static bool hf_goes_to_rest(const hf_finger *f)
         change[axis] = before[1 + axis] - first[1 + axis];
     }
     const hf_real most = HF_HELD_CHANGE * before[0];
-    hf_real least = HF_NOISE_WEIGHT * s->noise;
-    least = f->finger->step > 0 ? hf_max(least, HF_HELD_STEPS * f->finger->step) : least;
+    /* A step that is NaN does not count. */
+    const hf_real least = HF_LEAST_HOLD * hf_max(s->noise, f->finger->step);
     if (!(before[0] >= least && hf_square(change) <= most * most)) {
         return false;
     }
