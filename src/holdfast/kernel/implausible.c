@@ -223,11 +223,12 @@ static bool hf_has_zeros(const hf_finger *f, const hf_scan *scan)
 static bool hf_is_offset(
     const hf_finger *f, const hf_real jump[3], hf_real others, hf_real calm, hf_real quiet)
 {
-    /* |df_i| > 20 sqrt(max sum |df_j|^2 of all others so far). A magnetic skin spreads each touch;
-     * on other skins the first may be that of one taxel, which shows nothing. */
-    const hf_real square = hf_square(jump), shown = hf_max(f->state->shown, others);
-    if ((f->finger->is_magnetic || shown > quiet) && f->finger->n_used > HF_MIN_TAXELS &&
-        square > HF_JUMP_TO_SHOWN * HF_JUMP_TO_SHOWN * hf_max(shown, quiet)) {
+    /* |df_i| > 20 sqrt(max sum |df_j|^2 of all others so far). Before these have moved, the first
+     * touch may be that of one taxel: a magnetic skin spreads it, to a hundredth at least. */
+    const hf_real square = hf_square(jump), least = f->finger->is_magnetic ? 25 : HF_INFINITY;
+    hf_real shown = hf_max(f->state->shown, others);
+    shown = shown > quiet ? shown : least * quiet;
+    if (f->finger->n_used > HF_MIN_TAXELS && square > HF_JUMP_TO_SHOWN * HF_JUMP_TO_SHOWN * shown) {
         return true;
     }
     /* A byte was lost: 256 or 65536 steps along one axis, to 3 sqrt(calm), a tenth of it at most.
