@@ -19,13 +19,11 @@
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
 
-/* A hold has at least this many times the noise of the force, and the step of its readings. It
- * changes by at most this share of itself over the window of sigma. */
+/* A hold has at least this many times the noise of the force, and the step of its readings. */
 #define HF_LEAST_HOLD ((hf_real)20)
-#define HF_HELD_CHANGE ((hf_real)0.5)
 /* Time for which it is not known whether a finger without readings still holds [s]. */
 #define HF_REZEROED_SECONDS ((hf_real)0.5)
-/* Share of the lost force within which a force is that force. */
+/* Share of a force within which another is the same. */
 #define HF_SAME_FORCE ((hf_real)0.25)
 
 enum {
@@ -389,29 +387,35 @@ HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan)
     return faults;
 }
 
+static bool hf_is_same_force(const hf_real force[3], const hf_real other[3])
+{
+    hf_real change[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        change[axis] = force[axis] - other[axis];
+    }
+    return hf_square(change) <= HF_SAME_FORCE * HF_SAME_FORCE * hf_square(other);
+}
+
 /* Return whether the readings of a hold went to those of the tare within one sample. */
 static bool hf_goes_to_rest(const hf_finger *f)
 {
     const holdfast_finger_memory *const s = f->state;
     const size_t window = f->finger->sigma_window;
-    const hf_real *const before = hf_history(f, 1);
-    if (f->values->amplitude > HF_RELEASED_SHARE * before[0] || s->n_stretch < (int64_t)window) {
+    const hf_real *const held = hf_history(f, 1);
+    if (f->values->amplitude > HF_RELEASED_SHARE * held[0] || s->n_stretch < (int64_t)window) {
         return false;
     }
-    /* Held: |F(k-1)| >= 20 max(noise, step), and |F(k-1) - F(k - N_w + 1)| <= 1/2 |F(k-1)|: a hand that lets
-     * go takes some samples. */
+    /* Held: F(k-1) . n > 0, |F(k-1)| >= 20 max(noise, step), and F(k - l) is F(k-1) to a quarter
+     * for l = 2 and l = N_w - 1: a hand that lets go takes some samples. */
+    const hf_real *const before = hf_history(f, window > 2 ? 2 : 1);
     const hf_real *const first = hf_history(f, window - 1);
-    hf_real change[3];
-    for (size_t axis = 0; axis < 3; ++axis) {
-        change[axis] = before[1 + axis] - first[1 + axis];
-    }
-    const hf_real most = HF_HELD_CHANGE * before[0];
     /* A step that is NaN does not count. */
     const hf_real least = HF_LEAST_HOLD * hf_max(s->noise, f->finger->step);
-    if (!(before[0] >= least && hf_square(change) <= most * most)) {
+    if (!(held[0] >= least && hf_dot(held + 1, f->finger->normal) > 0 &&
+          hf_is_same_force(before + 1, held + 1) && hf_is_same_force(first + 1, held + 1))) {
         return false;
     }
-    /* At rest: sum |f_i - b_i|^2 <= 4 times that of noise + (0.08 |F(k-1)|)^2 / n. */
+    /* At rest: sum |f_i - b_i|^2 <= 4 times that of noise. */
     hf_sum squares = {{0}};
     for (size_t i = 0; i < f->n_taxels; ++i) {
         hf_real beyond[3];
@@ -421,8 +425,7 @@ static bool hf_goes_to_rest(const hf_finger *f)
         }
         hf_add(&squares, i, hf_square(beyond));
     }
-    const hf_real echo = HF_RELEASED_SHARE * before[0];
-    return hf_total(squares) <= 12 * s->noise * s->noise + echo * echo / f->finger->n_used;
+    return hf_total(squares) <= 12 * s->noise * s->noise;
 }
 
 /* Follow a finger whose readings all went to rest at once, in a hold. Return the fault of its first
@@ -445,15 +448,11 @@ HF_SHARED uint32_t hf_follow_rezero(const hf_finger *f, double time)
     if (!s->is_rezeroed) {
         return 0;
     }
-    hf_real change[3];
-    for (size_t axis = 0; axis < 3; ++axis) {
-        change[axis] = f->values->force[axis] - s->lost_force[axis];
-    }
     s->least_normal = hf_min(s->least_normal, hf_dot(f->values->force, f->finger->normal));
     if ((hf_real)(time - s->rezeroed_at) + f->hand->period / 2 >= HF_REZEROED_SECONDS) {
         return 0;
     }
-    if (hf_square(change) <= HF_SAME_FORCE * HF_SAME_FORCE * hf_square(s->lost_force)) {
+    if (hf_is_same_force(f->values->force, s->lost_force)) {
         s->is_rezeroed = false;
         s->n_stretch = s->motion.n_samples = 0;
     }

@@ -573,15 +573,17 @@ class Finger:
     def goes_to_rest(self, readings):
         if len(self.stretch) < self.window:
             return False
-        first, held = np.array(self.stretch[-self.window]), np.array(self.stretch[-2])
+        held = np.array(self.stretch[-2])
+        others = [self.stretch[-self.window], self.stretch[-3 if self.window > 2 else -2]]
         load, step = math.hypot(*held), self.sensor.step or 0.0
         step = step or float(self.sensor.unit == "count")
         left = float(((readings - self.baseline)[self.used] ** 2).sum())
         return (
             math.hypot(*self.force) <= 0.08 * load
             and load >= 20 * max(self.noise, step)
-            and math.dist(first, held) <= load / 2
-            and left <= 12 * self.noise**2 + (0.08 * load) ** 2 / len(self.used)
+            and held @ self.sensor.normal > 0
+            and all(math.dist(other, held) <= load / 4 for other in others)
+            and left <= 12 * self.noise**2
         )
 
     def watch_taxels(self, before, now, fresh):

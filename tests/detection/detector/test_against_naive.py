@@ -184,7 +184,7 @@ def test_equals_the_naive_detector_in_a_field(name, seed):
 @pytest.mark.parametrize("kind", ["magnetic", "counts", "N", "few"])
 def test_equals_the_naive_detector_with_jumps_and_new_baselines(kind, seed):
     """Taxels that jump and return, alone and in a press; holds that go to zero at once."""
-    n, n_taxels, rng = 500, 3 if kind == "few" else 6, np.random.default_rng([seed, len(kind), 1])
+    n, n_taxels, rng = 500, 3 if kind == "few" else 6, np.random.default_rng([seed, len(kind), 5])
     unit = "N" if kind == "N" else "count"
     which = sensor(n_taxels, kind, limits=None, unit=unit, magnetic=kind == "magnetic")
     which = replace(which, step=0.25) if kind == "N" else which
