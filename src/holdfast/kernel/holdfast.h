@@ -157,7 +157,9 @@ enum {
     HOLDFAST_REPEATED = 16384,  /* the last samples repeat those before them */
     HOLDFAST_FIELD = 32768,     /* a magnetic field, or a load: all taxels changed nearly alike */
     HOLDFAST_INVALID = 65536,   /* a reading of one taxel that it cannot have: it jumped */
-    HOLDFAST_REZEROED = 524288   /* all readings of a hold went to rest at once: a new baseline? */
+    HOLDFAST_EQUAL_TAXELS = 131072, /* taxels that change, and are equal all the time */
+    HOLDFAST_COPIED = 262144,       /* a finger that changes, and is equal to another */
+    HOLDFAST_REZEROED = 524288      /* all readings of a hold went to rest at once */
 };
 
 /* How the baseline is found. */

@@ -11,6 +11,12 @@
 /* A magnetometer that reads zero in all axes was read too early if it jumps there by this many
  * times as far as the other taxels move at this sample. */
 #define HF_ZERO_TO_STEPS ((hf_real)20)
+/* A hold has at least this many times the noise of the force, and the step of its readings. */
+#define HF_LEAST_HOLD ((hf_real)20)
+/* Time for which it is not known whether a finger without readings still holds [s]. */
+#define HF_REZEROED_SECONDS ((hf_real)0.5)
+/* Share of a force within which another is the same. */
+#define HF_SAME_FORCE ((hf_real)0.25)
 /* A jump of one taxel alone by this many times its noise is implausible until it stays there for a
  * second sample: a touch spreads over the skin. */
 #define HF_JUMP_TO_NOISE ((hf_real)50)
@@ -18,13 +24,6 @@
 #define HF_JUMP_TO_SHOWN ((hf_real)20)
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
-
-/* A hold has at least this many times the noise of the force, and the step of its readings. */
-#define HF_LEAST_HOLD ((hf_real)20)
-/* Time for which it is not known whether a finger without readings still holds [s]. */
-#define HF_REZEROED_SECONDS ((hf_real)0.5)
-/* Share of a force within which another is the same. */
-#define HF_SAME_FORCE ((hf_real)0.25)
 
 enum {
     HF_MIN_PERIOD = 3,   /* of a ring: the shortest [samples] */

@@ -125,6 +125,11 @@ typedef struct {
     bool has_new_field;     /* the field changed at this sample */
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
+    /* All readings went to rest at once, in a hold (implausible.c). */
+    bool is_rezeroed;       /* and nothing has touched since */
+    double rezeroed_at;     /* when [s] */
+    hf_real lost_force[3];  /* F_tip of the sample before */
+    hf_real least_normal;   /* least F_tip . n since */
     /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
     holdfast_taxel_set offset_taxels; /* taxels whose jump stays */
@@ -136,11 +141,6 @@ typedef struct {
     uint64_t ring_length;      /* successive samples with the sum of that a period before */
     uint64_t ring_age;         /* samples since the ring is followed */
     bool ring_varies;          /* enough readings and samples of the ring differ */
-    /* All readings went to rest at once, in a hold (implausible.c). */
-    bool is_rezeroed;       /* and nothing has touched since */
-    double rezeroed_at;     /* when [s] */
-    hf_real lost_force[3];  /* F_tip of the sample before */
-    hf_real least_normal;   /* least F_tip . n since */
     holdfast_motion motion;
     /* Readings that never changed (faults.c): last, as a living finger does not read it. */
     int64_t n_constant;   /* samples before the first that changed a reading */
