@@ -85,13 +85,6 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         "invalid readings",
         "readings jump, or fall to zero: check the cable and the driver's timing",
     ),
-    Fault.EQUAL_TAXELS: FaultText(
-        "equal taxels",
-        "taxels change and are equal all the time: check the wiring of the sensor",
-    ),
-    Fault.COPIED: FaultText(
-        "copied", "two fingers have the same readings: check the addresses of their sensors"
-    ),
     Fault.REZEROED: FaultText(
         "new zero",
         "all readings fell to zero at once: the object left, or the driver took a new baseline in "
@@ -99,6 +92,14 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     ),
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
+    ),
+    Fault.EQUAL_TAXELS: FaultText(
+        "equal taxels",
+        "taxels have the same readings while they change: check the cable and the channels, or "
+        "leave them out by --ignore FINGER:TAXEL",
+    ),
+    Fault.COPIED: FaultText(
+        "copied", "fingers have the same readings: one sensor is read twice; check the channels"
     ),
     Fault.SLOW: FaultText(
         "slow",
