@@ -13,8 +13,8 @@ from holdfast_grip.errors import HandError
 from holdfast_grip.hands.base import HandDevice
 from holdfast_grip.loop.grip_loop import GripLoop
 
-RATE, SKIN, START = 100, sensor("anyskin"), 500
-TIMES = np.arange(1000) / RATE
+RATE, SKIN, START, N = 100, sensor("anyskin"), 700, 1300
+TIMES = np.arange(N) / RATE
 REACTION = 0.5
 """Time from the detection of a fault to FAULT [s]."""
 
@@ -38,15 +38,15 @@ class Tape(HandDevice):
 
 
 def grasp():
-    """Readings of two fingers: open for 2 s, then a hold with a slow sway; whole counts."""
+    """Readings of two fingers, open for 2 s, then in a hold with a slow sway: in quarters."""
     hand = {}
     for seed, name in enumerate(("thumb", "index")):
         rng = np.random.default_rng(seed)
         grip = np.interp(TIMES, [2, 2.4], [0, 1]) * (1 + 0.01 * np.sin(3 * TIMES + seed))
         shares = np.array([0.5, 0.8, 1.0, 0.6, 0.4])[:, None] * [18, -12, 400]
         zero = rng.uniform(-300, 300, (5, 3))
-        noise = rng.normal(scale=2, size=(1000, 5, 3))
-        hand[name] = np.rint(zero + grip[:, None, None] * shares + noise)
+        noise = rng.normal(scale=2, size=(N, 5, 3))
+        hand[name] = np.rint(4 * (zero + grip[:, None, None] * shares + noise)) / 4
     return hand
 
 
@@ -54,7 +54,7 @@ def ring(hand, period, toggles=False):
     last = hand["index"][START - period : START]
     hand["index"][START:] = np.resize(last, hand["index"][START:].shape)
     if toggles:
-        hand["index"][START:, 4, 1] += np.random.default_rng(9).integers(0, 2, 500)
+        hand["index"][START:, 4, 1] += np.random.default_rng(9).integers(0, 2, N - START)
 
 
 def equal_taxels(hand):
@@ -74,8 +74,8 @@ def copied(hand):
 
 
 def last_bit(hand):
-    frozen = hand["index"][START] + np.random.default_rng(9).integers(0, 2, (500, 5, 3))
-    hand["index"][START:] = frozen
+    bits = np.random.default_rng(9).integers(0, 2, (N - START, 5, 3))
+    hand["index"][START:] = hand["index"][START] + bits / 4
 
 
 def jump(hand, size):
