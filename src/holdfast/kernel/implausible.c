@@ -1,7 +1,8 @@
-/* Readings that are valid but implausible: of a whole finger, or of a taxel at one sample.
+/* Readings that are valid but implausible: of a whole finger, or of a taxel that jumps.
  *
  * They are judged by the readings alone, whatever the tare, and refused: they reach no tare, force
- * or window. Each rule costs a few comparisons at a plausible sample. */
+ * or window. Each rule costs a few comparisons at a plausible sample. A hold that is at rest at
+ * once is found after the tare, by its force. */
 #include "finger.h"
 
 /* No sensor sends readings that are all smaller than this but not all zero. It is a number of
@@ -339,7 +340,8 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
             continue; /* at its second sample, a jump is plausible */
         }
         /* A sensor with a dead band jumps to and from zeros, too. */
-        const bool has_readings = hf_has_reading(f->readings, n, i) && hf_has_reading(f->previous, n, i);
+        const bool has_readings =
+            hf_has_reading(f->readings, n, i) && hf_has_reading(f->previous, n, i);
         const bool stays = is_lone && has_readings && !hf_has(&s->offset_taxels, i) &&
                            hf_is_offset(f, step, others, hf_max(of_noise, each), quiet);
         if (is_loud || stays) {

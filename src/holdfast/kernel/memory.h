@@ -126,15 +126,16 @@ typedef struct {
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
     /* All readings went to rest at once, in a hold (implausible.c). */
-    bool is_rezeroed;       /* and nothing has touched since */
-    double rezeroed_at;     /* when [s] */
-    hf_real lost_force[3];  /* F_tip of the sample before */
-    hf_real least_normal;   /* least F_tip . n since */
+    bool is_rezeroed;      /* and nothing has touched since */
+    double rezeroed_at;    /* when [s] */
+    hf_real lost_force[3]; /* F_tip of the sample before */
+    hf_real least_normal;  /* least F_tip . n since */
+    /* Jumps that stay (implausible.c). */
+    holdfast_taxel_set offset_taxels; /* taxels that have one */
+    bool has_offsets; /* there are some, or a jump of the last sample that may stay */
+    hf_real shown;    /* most that all taxels but one moved at once: sum of squares */
     /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
-    holdfast_taxel_set offset_taxels; /* taxels whose jump stays */
-    bool has_offsets;          /* there are some, or a jump of the last sample that may stay */
-    hf_real shown;             /* most that all taxels but one moved at once: sum of squares */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
     uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
     uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */
