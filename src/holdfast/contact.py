@@ -75,7 +75,7 @@ class Reason(_Coded):
 class Fault(_Coded):
     """Fault of a finger. Bit i of a fault mask is position i in this list: `Fault(i)`.
 
-    The detector finds the faults up to TARE_DRIFT, and those from OFFSET to INVALID, in the
+    The detector finds the faults up to TARE_DRIFT, and those from OFFSET to REZEROED, in the
     readings. A source reports the others, which concern the arrival of samples.
     """
 
@@ -96,6 +96,9 @@ class Fault(_Coded):
     REPEATED = "repeated"
     FIELD = "field"
     INVALID = "invalid"
+    EQUAL_TAXELS = "equal_taxels"
+    COPIED = "copied"
+    REZEROED = "rezeroed"
     SLOW = "slow"
 
 

@@ -183,6 +183,8 @@ def _with_faults(rng, readings, k):
         readings = 1.0 + RING[: len(readings), k % 30] % 3
     elif 840 <= spoilt < 850:
         readings = 0.3 * readings
+    elif 900 <= spoilt < 960:
+        readings[1, 2] += 256.0 if readings[1, 2] > 1000.0 else 60.0  # a jump that stays
     elif 880 <= spoilt < 890:
         readings = 1e-318 * np.ones_like(readings)
     if k % 5000 > 4500:

@@ -72,6 +72,7 @@ static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
     finger->high_end = in_counts ? 64880 : HF_INFINITY;
     finger->max_offset = in_counts ? 50000 * finger->n_used : HF_INFINITY;
     finger->min_noise = in_counts ? 1 : (hf_real)1e-6;
+    finger->step = in_counts ? 1 : HF_NAN;
     finger->rounding_noise = in_counts ? (hf_real)0.3 : HF_NAN;
     const hf_real fields[4] = {0, 130, HF_INFINITY, 0};
     finger->max_field = fields[take(in, 1) % 4];

@@ -92,9 +92,10 @@ class _Finger:
         self._left = int(rng.integers(1, max(2, 3 * self._rate)))
         self.regime = str(rng.choice(
             ["free", "held", "held", "sliding", "still", "zeros", "repeated", "offset", "rail",
-             "tiny", "noisy", "saturated", "invalid", "pull", "huge", "release"],
-            p=[0.2, 0.1, 0.1, 0.1, 0.05, 0.03, 0.05, 0.02, 0.02, 0.02, 0.08, 0.05, 0.08, 0.04,
-               0.02, 0.04],
+             "tiny", "noisy", "saturated", "invalid", "pull", "huge", "release",
+             "jumped"],
+            p=[0.2, 0.1, 0.1, 0.1, 0.05, 0.03, 0.05, 0.02, 0.02, 0.02, 0.06, 0.03, 0.06, 0.04,
+               0.02, 0.04, 0.06],
         ))  # fmt: skip
         some = rng.integers(1, self._n + 1) if rng.random() < 0.3 else min(self._n, 1)
         self._taxels = rng.choice(self._n, some, replace=False)
@@ -107,6 +108,7 @@ class _Finger:
         if self.regime == "pull":
             self._load = np.array([0.0, 0.0, -60.0])
         self._ring = rng.integers(0, 30, (int(rng.integers(3, 70)), self._n, 3))
+        self._jump = float(rng.choice([256, -256, 5000, 65536]))
         self._bad = rng.choice([np.nan, np.inf, -np.inf, 1e9, -1e9])
 
     def next(self, k):
@@ -143,6 +145,8 @@ class _Finger:
             readings[self._taxels] = rng.choice([0.0, 65535.0])
         elif regime == "invalid":
             readings[self._taxels, rng.integers(3)] = self._bad
+        elif regime == "jumped":
+            readings[self._taxels[0], 1] += self._jump * self._step
         elif regime == "huge" and not self._in_counts:
             readings = readings * 1e200
         if np.isfinite(readings).all() and regime != "huge":

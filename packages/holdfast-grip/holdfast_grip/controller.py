@@ -4,7 +4,7 @@ import math
 from collections import defaultdict, deque
 from collections.abc import Mapping
 
-from holdfast.contact import ContactState, HandEstimate, Reason
+from holdfast.contact import ContactState, Fault, HandEstimate, Reason
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast_grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
@@ -34,6 +34,11 @@ MIN_OPENING = 0.1
 """Share of the way that the joints closed, by which they went back when the object is let go."""
 MIN_CLOSING = 0.05
 """Length of that way from which its direction is known [rad]."""
+IMPLAUSIBLE = frozenset(
+    {Fault.INVALID, Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.COPIED, Fault.REZEROED}
+)
+"""Faults of readings that no skin gives. A grip does not go on with them, though the state of the
+finger may be that of its other taxels."""
 KEEP = FingerCommand(1.0)
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
@@ -323,7 +328,7 @@ class GripController:
             # First whether the numbers are new and known, then their values. `not >=`: NaN is late.
             if finger is None or not finger.time >= due:
                 problem = GripReason.STALE
-            elif finger.state is _UNKNOWN:
+            elif finger.state is _UNKNOWN or not IMPLAUSIBLE.isdisjoint(finger.faults):
                 touch.known = known = False
                 if self._lasts(k, time):
                     is_gap = finger.reason is Reason.GAP  # samples are missing, no sensor is faulty

@@ -174,6 +174,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "max_offset": OFFSET_SHARE * (high - low) * n_used * SUM_OF_WEIGHTS,
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
+        "step": sensor.step or (1.0 if sensor.unit == "count" else np.nan),
         "is_magnetic": bool(sensor.magnetic),
         "rests_at_zero": bool(sensor.rests_at_zero),
         # The load of the start, when it goes, may look like a field.

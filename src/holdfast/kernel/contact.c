@@ -255,7 +255,7 @@ HF_SHARED int hf_find_contact(
     const bool by_noise = rule->contact == HOLDFAST_CONTACT_BY_NOISE;
     const hf_real threshold = by_noise ? rule->contact_limit * noise : rule->contact_limit;
     const hf_real quiet = hf_noise_sigma(noise, f->finger->sigma_window);
-    if (zero_unknown) { /* first, because the load counts from the rest */
+    if (zero_unknown || f->state->is_rezeroed) { /* first: the load counts from the rest */
         hf_update_rest(f, d);
     }
     const hf_real load = hf_load_of_force(f, d, quiet, time);

@@ -97,6 +97,11 @@ static inline void hf_clear(holdfast_taxel_set *set)
     *set = none;
 }
 
+static inline void hf_remove(holdfast_taxel_set *set, size_t taxel)
+{
+    set->words[taxel / 64] &= ~((uint64_t)1 << taxel % 64);
+}
+
 /* Add the taxels of another set. */
 static inline void hf_unite(
     const hf_finger *f, holdfast_taxel_set *set, const holdfast_taxel_set *other)
@@ -254,8 +259,11 @@ HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
 HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
 
 /* implausible.c */
+HF_SHARED void hf_take_out_jumps(const hf_finger *f);
 HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_taxel_set *jumps);
 HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan);
+HF_SHARED uint32_t hf_follow_rezero(const hf_finger *f, double time);
+HF_SHARED bool hf_touches_rezeroed(const hf_finger *f);
 
 /* tare.c: how far the first sample is known to be a reading */
 enum { HF_PROVISIONAL, HF_SETTLES, HF_CONFIRMED };

@@ -156,7 +156,10 @@ enum {
     HOLDFAST_OFFSET = 8192,     /* all readings have left the tare together */
     HOLDFAST_REPEATED = 16384,  /* the last samples repeat those before them */
     HOLDFAST_FIELD = 32768,     /* a magnetic field, or a load: all taxels changed nearly alike */
-    HOLDFAST_INVALID = 65536    /* a reading of one taxel that its magnetometer cannot have */
+    HOLDFAST_INVALID = 65536,   /* a reading of one taxel that it cannot have: it jumped */
+    HOLDFAST_EQUAL_TAXELS = 131072, /* taxels that change, and are equal all the time */
+    HOLDFAST_COPIED = 262144,       /* a finger that changes, and is equal to another */
+    HOLDFAST_REZEROED = 524288      /* all readings of a hold went to rest at once */
 };
 
 /* How the baseline is found. */
@@ -266,6 +269,7 @@ typedef struct {
     hf_real max_field;      /* largest common field, see field.c; 0 where none is found, inf where
                                the unit of the readings is not known */
     hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
+    hf_real step;           /* smallest change of a reading; NaN where it is not known */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */

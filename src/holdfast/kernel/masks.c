@@ -184,6 +184,7 @@ HF_SHARED bool hf_replace_invalid(const hf_finger *f, const holdfast_taxel_set *
     hf_unite(f, &left_out, &s->masked);
     hf_unite(f, &left_out, &s->faulty_taxels);
     hf_unite(f, &left_out, &s->lost);
+    hf_unite(f, &left_out, &s->offset_taxels);
     if (hf_are_equal(f, &left_out, &s->masked)) {
         return !s->too_many;
     }

@@ -24,6 +24,7 @@ typedef struct {
 typedef struct {
     hf_real last_healthy[3]; /* reading beyond rest when the mask last changed */
     hf_real fade[3];         /* is added to the reading of a taxel that came back */
+    hf_real jump[3];         /* by which the reading is off since a jump (implausible.c) */
     double masked_at;        /* time from which it is left out [s] */
     bool unweighed;          /* it is left out, and its share of the load is not known */
 } holdfast_mask;
@@ -129,6 +130,15 @@ typedef struct {
     bool has_new_field;     /* the field changed at this sample */
     bool is_untouched;      /* but for it, all taxels read what they did in the tare */
     int64_t n_unclear;      /* successive samples that may be of a field or of a load */
+    /* All readings went to rest at once, in a hold (implausible.c). */
+    bool is_rezeroed;      /* and nothing has touched since */
+    double rezeroed_at;    /* when [s] */
+    hf_real lost_force[3]; /* F_tip of the sample before */
+    hf_real least_normal;  /* least F_tip . n since */
+    /* Jumps that stay (implausible.c). */
+    holdfast_taxel_set offset_taxels; /* taxels that have one */
+    bool has_offsets; /* there are some, or a jump of the last sample that may stay */
+    hf_real shown;    /* most that all taxels but one moved at once: sum of squares */
     /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */

@@ -112,11 +112,13 @@ static int32_t hf_process_force(
         v->sigma = hf_sqrt(moments.variance);
     }
     /* With other tares a hand may hold an object at the start: then it is a notice and no fault. */
-    if (f->hand->tare_kind == HOLDFAST_TARE_SECONDS && hf_is_pulled(f, normal)) {
+    if (f->hand->tare_kind == HOLDFAST_TARE_SECONDS && !s->is_rezeroed && hf_is_pulled(f, normal)) {
         finger_faults |= HOLDFAST_TARE_LOADED;
         v->faults |= HOLDFAST_TARE_LOADED;
     }
-    if (finger_faults) {
+    const uint32_t rezeroed = hf_follow_rezero(f, time);
+    v->faults |= rezeroed;
+    if (finger_faults | rezeroed) {
         return HOLDFAST_FAULT;
     }
     const int64_t n_known = f->finger->bridges ? s->motion.n_samples : s->n_stretch;
@@ -191,6 +193,13 @@ static int32_t hf_process(const hf_finger *f, double time)
     v->taxels = s->lost;
     if (s->lost_faults) {
         hf_hold_lost(f);
+    }
+    if (s->has_offsets) {
+        hf_take_out_jumps(f);
+        if (s->has_offsets) {
+            v->faults |= HOLDFAST_INVALID;
+            hf_unite(f, &v->taxels, &s->offset_taxels);
+        }
     }
     hf_scan scan = hf_scan_readings(f, f->readings);
     const bool are_valid = hf_are_valid(f, &scan);

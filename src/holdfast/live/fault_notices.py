@@ -83,10 +83,23 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     ),
     Fault.INVALID: FaultText(
         "invalid readings",
-        "readings jump for a single sample, or to zero: check the cable and the driver's timing",
+        "readings jump, or fall to zero: check the cable and the driver's timing",
+    ),
+    Fault.REZEROED: FaultText(
+        "new zero",
+        "all readings fell to zero at once: the object left, or the driver took a new baseline in "
+        f"the grip; open the hand and {_NEW_TARE}",
     ),
     Fault.REPEATED: FaultText(
         "repeated", "the same few samples come again and again: restart the device or its server"
+    ),
+    Fault.EQUAL_TAXELS: FaultText(
+        "equal taxels",
+        "taxels have the same readings while they change: check the cable and the channels, or "
+        "leave them out by --ignore FINGER:TAXEL",
+    ),
+    Fault.COPIED: FaultText(
+        "copied", "fingers have the same readings: one sensor is read twice; check the channels"
     ),
     Fault.SLOW: FaultText(
         "slow",

@@ -11,7 +11,7 @@ NAN = math.nan
 
 ORDER = (
     "not_finite", "stuck", "saturated", "tare_loaded", "dead", "noisy", "out_of_range",
-    "tare_drift", "offset", "repeated", "field", "invalid",
+    "tare_drift", "offset", "repeated", "field", "invalid", "rezeroed",
 )  # fmt: skip
 
 
@@ -183,7 +183,8 @@ class Finger:
         self.longest = max([window, *(spec.window for spec in part.features)])
         self.samples = []  # every finite sample: (time, readings)
         self.frames, self.rest_readings = [], None
-        self.jumped = set()
+        self.jumped, self.pending, self.offsets, self.shown = set(), {}, {}, 0.0
+        self.rezeroed, self.rezeroed_at = False, NAN
         self.axes, self.stuck_axes = {}, [set(), set(), set()]
         self.field = self.still_field = np.zeros(3)
         self.common, self.speeds = np.zeros((2, 3)), np.zeros((2, 3))
@@ -298,18 +299,21 @@ class Finger:
         for i in self.lost:
             readings[i] = 0.0 if low < 0 < high else (low + high) / 2
             self.taxels[i].at = self.n_news
+        if offsets := self.take_out_offsets(readings):
+            faults |= {"invalid"}
         self.confirm_zero(readings, time)
         bad = {i for i in self.used if not np.isfinite(readings[i]).all()}
         outside = {i for i in self.used if ((readings[i] < low) | (readings[i] > high)).any()} - bad
         first = self.zero != "confirmed" and len(self.samples) < 2
         jumps = set() if fresh or first else self.jumps(readings)
         if bad or outside or jumps:
-            faults |= {"invalid"} if jumps else set()
-            faults |= {"not_finite"} if bad else set()
-            faults |= {"out_of_range"} if outside else set()
-            invalid |= bad | outside | jumps
+            new = {"invalid"} if jumps else set()
+            new |= {"not_finite"} if bad else set()
+            new |= {"out_of_range"} if outside else set()
+            faults, lost = faults | new, bad | outside | jumps | self.lost
+            invalid |= bad | outside | jumps | offsets
             if self.baseline is None:
-                self.lose(faults, invalid)
+                self.lose(new | self.lost_faults, lost)
                 self.watch_life(readings, time)
                 return self.refuse(faults, invalid)
             raw = readings.copy()
@@ -325,6 +329,7 @@ class Finger:
             if not enough:
                 self.watch_life(raw, time)
                 return self.refuse(faults, invalid)
+        invalid |= offsets
         self.watch_life(readings, time)
         if implausible := self.implausible(readings):
             return self.refuse(faults | implausible, invalid)
@@ -347,28 +352,82 @@ class Finger:
             return None
         return self.process_force(readings, faults, invalid, time, was_tared)
 
+    def take_out_offsets(self, readings):
+        """Subtract jumps that stay, until a step undoes them; the taxels that have one."""
+        for i in self.used:
+            if i in self.offsets:
+                jump = self.offsets[i]
+                step = readings[i] - jump - self.samples[-1][1][i]
+                if step @ step > jump @ jump / 4:
+                    self.offsets[i] = jump + step
+                    if self.offsets[i] @ self.offsets[i] <= jump @ jump / 4:
+                        del self.offsets[i]
+            elif i in self.pending:
+                jump = self.pending[i]
+                step = readings[i] - self.samples[-1][1][i] - jump
+                if 100 * (step @ step) <= jump @ jump:
+                    self.offsets[i] = jump
+            if i in self.offsets:
+                readings[i] = readings[i] - self.offsets[i]
+        return set(self.offsets)
+
     def jumps(self, readings):
-        """Magnetometers that fall to zero, or jump while all others are quiet, for one sample."""
-        before, self.jumped = self.jumped, set()
-        if not (self.sensor.magnetic and self.samples):
+        """Magnetometers that fall to zero, and taxels that jump alone."""
+        if not self.samples:
             return set()
-        last, n = self.samples[-1][1], len(self.used)
-        steps = {i: float(((readings[i] - last[i]) ** 2).sum()) for i in self.used}
-        others = {i: step for i, step in steps.items() if readings[i].any()}
+        before, self.jumped, self.pending = self.jumped, set(), {}
+        last, n, magnetic = self.samples[-1][1], len(self.used), self.sensor.magnetic
+        moves = {i: readings[i] - last[i] for i in self.used}
+        steps = {i: float(move @ move) for i, move in moves.items()}
+        at_zero = {i for i in self.used if magnetic and not readings[i].any()}
+        kept = {i: step for i, step in steps.items() if i not in at_zero}
         noise = 0.0 if math.isnan(self.noise) else 6 * self.noise**2 / n
-        most = max(steps.values())
-        if len(others) == n and most < 0.9 * sum(steps.values()):
+        most, total = max(steps.values()), sum(steps.values())
+        alone = most >= 0.9 * total
+        if not at_zero and not alone:
+            self.show(readings, total - most)
             return set()
-        fallen = any(step > 0 for i, step in steps.items() if i not in others)
+        fallen = any(steps[i] > 0 for i in at_zero)
+        others = max(0.0, sum(kept.values()) - most)
+        each = others / max(len(kept) - 1, 1)
         if math.isnan(self.noise) and not fallen:
-            noise = max(0.0, sum(steps.values()) - most) / max(len(others) - 1, 1)
-        usual = max(noise, sum(others.values()) / max(len(others), 1))
-        zeros = {i for i in self.used if i not in others and 0 < steps[i] > 400 * usual}
-        quiet = 9 * noise * (len(others) - 1)
-        lone = sum(others.values()) - most <= quiet and len(others) >= 4
-        if lone and noise > 0 and most > 2500 * noise:
-            self.jumped = {i for i in self.used if steps[i] > quiet} - zeros - before
+            noise = each
+        usual = max(noise, sum(kept.values()) / max(len(kept), 1))
+        zeros = {i for i in at_zero if 0 < steps[i] > 400 * usual}
+        quiet = 9 * noise * (len(kept) - 1)
+        loud = magnetic and others <= quiet and len(kept) >= 4 and noise > 0 and most > 2500 * noise
+        for i in set(self.used) - zeros - before:
+            if not (loud or alone) or not steps[i] > (quiet if loud else most / 2):
+                continue
+            stays = alone and readings[i].any() and last[i].any() and i not in self.offsets
+            if stays and self.is_offset(moves[i], others, max(noise, each), quiet):
+                self.pending[i] = moves[i]
+            if loud or i in self.pending:
+                self.jumped.add(i)
+        if not self.jumped:
+            self.show(readings, sum(kept.values()) - most)
         return zeros | self.jumped
+
+    def show(self, readings, others):
+        low, high = self.sensor.range or (-math.inf, math.inf)
+        used = readings[self.used]
+        if math.isfinite(others) and (low <= used).all() and (used <= high).all():
+            self.shown = max(self.shown, others)
+
+    def is_offset(self, jump, others, calm, quiet):
+        """Whether a jump is 20 times what others have shown, or a byte that is lost."""
+        shown = max(self.shown, others)
+        if shown <= quiet:
+            shown = 25 * quiet if self.sensor.magnetic else math.inf
+        if len(self.used) > 4 and jump @ jump > 400 * shown:
+            return True
+        step = self.sensor.step or (1.0 if self.sensor.unit == "count" else math.nan)
+        for axis in range(3):
+            size, rest = abs(jump[axis]), jump @ jump - jump[axis] ** 2
+            whole = step * (65536 if size > 4096 * step else 256)
+            if 900 * calm <= whole**2 and (size - whole) ** 2 + rest <= 9 * calm:
+                return True
+        return False
 
     def take_out_field(self, readings, left_out):
         """Subtract what all magnetometers read of a field; whether it may be a load instead."""
@@ -527,9 +586,12 @@ class Finger:
             self.largest = max(self.largest, math.hypot(*force))
             if len(self.stretch) >= self.window:
                 self.sigma = self.moments(self.window)[1]
-            if self.loaded(readings):
+            if not self.rezeroed and self.loaded(readings):
                 faults.add("tare_loaded")
                 serious.add("tare_loaded")
+            if self.follow_rezero(readings, time):
+                faults.add("rezeroed")
+                serious.add("rezeroed")
         self.faults = tuple(fault for fault in ORDER if fault in faults)
         self.faulty_taxels = tuple(sorted(taxels)) if faults else ()
         if serious:
@@ -538,6 +600,40 @@ class Finger:
             self.status = "gap" if self.gapped else "warm_up"
         else:
             self.status, self.gapped = "", False
+
+    def follow_rezero(self, readings, time):
+        """Whether all readings of a hold went to rest at once in the last half second."""
+        force = np.array(self.force)
+        normal = float(force @ self.sensor.normal)
+        if self.goes_to_rest(readings):
+            self.rezeroed, self.rezeroed_at, self.least = True, time, 0.0
+            self.lost_force = np.array(self.stretch[-2])
+            self.interrupt()
+            return True
+        if not self.rezeroed:
+            return False
+        self.least = min(self.least, normal)
+        if time - self.rezeroed_at + self.period / 2 >= 0.5:
+            return False
+        if math.dist(force, self.lost_force) <= 0.25 * math.hypot(*self.lost_force):
+            self.rezeroed, self.stretch = False, []
+        return self.rezeroed
+
+    def goes_to_rest(self, readings):
+        if len(self.stretch) < self.window:
+            return False
+        held = np.array(self.stretch[-2])
+        others = [self.stretch[-self.window], self.stretch[-3 if self.window > 2 else -2]]
+        load, step = math.hypot(*held), self.sensor.step or 0.0
+        step = step or float(self.sensor.unit == "count")
+        left = float(((readings - self.baseline)[self.used] ** 2).sum())
+        return (
+            math.hypot(*self.force) <= 0.08 * load
+            and load >= 20 * max(self.noise, step)
+            and held @ self.sensor.normal > 0
+            and all(math.dist(other, held) <= load / 4 for other in others)
+            and left <= 12 * self.noise**2
+        )
 
     def watch_taxels(self, before, now, fresh):
         self.n_news += 1
@@ -805,6 +901,9 @@ class Finger:
 
     def drifted(self, time):
         amplitude, threshold = math.hypot(*self.force), self.contact()
+        normal = self.sensor.normal
+        if self.rezeroed and np.array(self.force) @ normal < self.rest @ normal:
+            self.rest = np.array(self.force)
         self.load = math.dist(self.force, self.rest)
         self.peak = max(self.load, self.peak * (1 - min(1, self.period / 5)))
         mean = sum(math.hypot(*force) for force in self.stretch[-self.window :]) / self.window
@@ -816,6 +915,11 @@ class Finger:
         if not (self.window > 2 and self.sigma <= 3 * quiet):
             self.shaken = time
         self.empty = self.is_empty(time)
+        if self.rezeroed:
+            risen = float(np.array(self.force) @ normal) - self.least
+            self.rezeroed = self.empty or risen <= 0.08 * math.hypot(*self.lost_force)
+            self.empty = self.rezeroed
+            self.faults += ("rezeroed",) * self.rezeroed
         self.leaving = self.is_leaving()
         calm = self.window > 2 and self.sigma <= 3 * quiet and away <= threshold / 2
         if not calm:

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -176,6 +178,43 @@ def test_equals_the_naive_detector_in_a_field(name, seed):
         seen |= {*estimate.fingers["thumb"].faults, *estimate.fingers["index"].faults}
         seen |= {"shared"} if slow.fingers["thumb"].is_shared else set()
     assert {Fault.INVALID, Fault.STUCK, "shared"} <= seen
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", ["magnetic", "counts", "N", "few"])
+def test_equals_the_naive_detector_with_jumps_and_new_baselines(kind, seed):
+    """Taxels that jump and return, alone and in a press; holds that go to zero at once."""
+    n, n_taxels, rng = 500, 3 if kind == "few" else 6, np.random.default_rng([seed, len(kind), 5])
+    unit = "N" if kind == "N" else "count"
+    which = sensor(n_taxels, kind, limits=None, unit=unit, magnetic=kind == "magnetic")
+    which = replace(which, step=0.25) if kind == "N" else which
+    grip = np.zeros(n)
+    for start in range(60, 400, 170):
+        grip[start : start + 110] = np.interp(np.arange(110), [0, rng.integers(1, 40)], [0, 1])
+    values = grip[:, None, None] * rng.uniform(0.2, 1, (n_taxels, 1)) * [10, 5, 150]
+    values += rng.normal(size=(n, n_taxels, 3)) * (which.step or 1.0)
+    if kind != "magnetic":
+        values = (which.step or 1.0) * np.rint(values / (which.step or 1.0))
+    for start in rng.integers(20, n - 50, size=6):
+        jump = rng.choice([-1, 1]) * rng.choice([256, 65536, 700, 9000]) * (which.step or 1.0)
+        end = start + rng.choice([1, 2, 30, n])
+        values[start:end, rng.integers(n_taxels), rng.integers(3)] += jump
+    at, dip = 230 + rng.integers(60, 110), 60 + rng.integers(60, 100)
+    values[at:] -= values[at - 1] - (which.step or 1.0) * np.rint(rng.normal(size=(n_taxels, 3)))
+    values[dip : dip + 2] = values[0:2]
+    values[rng.integers(n, size=3), 0, 1] = np.nan
+    hand_model = model(("thumb",), tare="0.2", threshold=25.0, which=which)
+    detector = Detector(hand_model)
+    slow = naive.Hand(hand_model, {"thumb": which}, Tare.parse("0.2"), RATE)
+    seen, gap = set(), rng.integers(100, n - 50)
+    for k, readings in enumerate(values):
+        if not gap <= k < gap + 5:
+            estimate = detector.update({"thumb": readings}, k / RATE)
+            same(estimate, slow.update({"thumb": readings}, k / RATE))
+            seen |= {*estimate.fingers["thumb"].faults}
+            seen |= {"stays"} if slow.fingers["thumb"].offsets else set()
+    assert Fault.REZEROED in seen
+    assert "stays" in seen or kind == "few"
 
 
 def test_equals_the_naive_detector_with_contact_by_noise():

@@ -53,7 +53,8 @@ class TestFaults:
         values = np.full((600, 2, 3), 500.0)
         values[60:300] = lively(300)[60:]
         found = runs(self.faults(values), lambda f: f)
-        assert found == [((), 49), ((Fault.DEAD,), 11), ((), 540)]
+        rested = ((Fault.REZEROED,), 300)  # within one sample, as after a new baseline
+        assert found == [((), 49), ((Fault.DEAD,), 11), ((), 240), rested]
 
     def test_a_sensor_that_settles_is_not_stuck(self):
         values = np.full((300, 2, 3), 500.0)

@@ -123,7 +123,7 @@ def faulty_readings(
     if n_invalid > INVALID_SHARE * n_samples:
         text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that "
         text += "cannot be true, of one taxel, which is left out: is a magnetometer read before it "
-        found.append(Finding(name, "invalid", text + "is ready?"))
+        found.append(Finding(name, "invalid", text + "is ready, or a byte lost?"))
     if stuck:
         taxels = f"taxel{'s' if len(stuck) > 1 else ''} {', '.join(map(str, stuck))}"
         text = f"no change of {taxels}, or of one axis, from some time on: left out since"
