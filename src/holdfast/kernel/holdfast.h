@@ -7,7 +7,7 @@
  *   A hand is a few fingers (fingertips, pads). A finger has one sensor of n_taxels taxels, each of
  *   which reports a force in three axes. At a sample, each finger that is present goes through:
  *
- *     readings -> valid? (faults.c) -> plausible? (implausible.c)
+ *     readings -> valid? (faults.c) -> plausible? (implausible.c), as of a living skin? (laws.c)
  *              -> changes and faulty taxels (faults.c)
  *              -> tare and noise (tare.c) -> magnetic field taken out (field.c)
  *              -> faulty taxels filled in (masks.c)
@@ -213,7 +213,8 @@ enum {
 };
 
 enum {
-    HF_N_RING_SUMS = 128, /* kept sums of samples: two of the longest periods (implausible.c) */
+    HF_RUN = 8,           /* updates of a finger in a run (laws.c) */
+    HF_N_MARKS = 64,      /* runs that are kept: those of the last 512 updates */
     HF_N_SUMS = 3,        /* of a block of pairs: P, D and S (window.c) */
     HF_N_COMPONENTS = 4,  /* of the history: F_a, F_x, F_y, F_z */
     HF_MAX_FINGER_TAXELS = 64 * HOLDFAST_MASK_WORDS,

@@ -28,8 +28,8 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.powers = memory->powers + 2 * first;
     f.taxels = memory->taxels + first;
     f.masks = memory->masks + first;
-    f.rings = memory->rings + first;
-    f.sums = memory->sums + index * HF_N_RING_SUMS;
+    f.levels = memory->levels + first;
+    f.laws = &memory->laws[index];
     f.history = memory->history + index * HF_N_HISTORY(hand) * HF_N_COMPONENTS;
     f.blocks = memory->blocks + index * HF_N_HISTORY(hand) * n_blocks;
     f.track = memory->track + index * HF_N_TRACK(hand);
@@ -241,6 +241,10 @@ static int32_t hf_process(const hf_finger *f, double time)
         v->faults |= s->taxel_faults;
         hf_unite(f, &v->taxels, &s->faulty_taxels);
     }
+    if (f->laws->has_equals) {
+        v->faults |= HOLDFAST_EQUAL_TAXELS;
+        hf_unite(f, &v->taxels, &f->laws->equals);
+    }
     if (is_saturated) {
         const holdfast_taxel_set at_limit = hf_taxels_outside(f, low, high);
         v->faults |= HOLDFAST_SATURATED;
@@ -400,6 +404,7 @@ HF_API void holdfast_advance(
             hf_compute_own(&f, hand->features + i * width, memory->own + i * width);
         }
     }
+    hf_find_copies(hand, memory, present);
     if (hand->alike) {
         hf_compute_of_hand(hand, memory);
     }

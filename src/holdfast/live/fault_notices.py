@@ -91,7 +91,15 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         f"the grip; open the hand and {_NEW_TARE}",
     ),
     Fault.REPEATED: FaultText(
-        "repeated", "the same few samples come again and again: restart the device or its server"
+        "repeated", "earlier readings come again in their order: restart the device or its server"
+    ),
+    Fault.EQUAL_TAXELS: FaultText(
+        "equal taxels",
+        "taxels have the same readings while they change: check the cable and the channels, or "
+        "leave them out by --ignore FINGER:TAXEL",
+    ),
+    Fault.COPIED: FaultText(
+        "copied", "fingers have the same readings: one sensor is read twice; check the channels"
     ),
     Fault.EQUAL_TAXELS: FaultText(
         "equal taxels",
