@@ -213,8 +213,8 @@ enum {
 };
 
 enum {
-    HF_RUN = 8,           /* updates of a finger in a run (laws.c) */
-    HF_N_MARKS = 64,      /* runs that are kept: those of the last 512 updates */
+    HF_RUN = 16,          /* updates of a finger in a run (laws.c) */
+    HF_N_MARKS = 32,      /* runs that are kept: those of the last 512 updates */
     HF_N_SUMS = 3,        /* of a block of pairs: P, D and S (window.c) */
     HF_N_COMPONENTS = 4,  /* of the history: F_a, F_x, F_y, F_z */
     HF_MAX_FINGER_TAXELS = 64 * HOLDFAST_MASK_WORDS,

@@ -14,7 +14,7 @@ enum {
     HF_MIN_RETURNED = 9,  /* the same, where a lane of the taxels is left out */
     HF_MIN_SHARED = 20,   /* changes for which taxels, axes or fingers are equal by a fault */
     HF_MAX_WATCHED = 160, /* updates in which a taxel must change so often, to be compared */
-    HF_MIN_AXIS_CHANGES = 10
+    HF_MIN_AXIS_CHANGES = 10 /* from which the past of an axis shows how long it rests */
 };
 /* An axis is frozen if it rests for this long [s], and for this many times as long as any ever
  * did. */
@@ -30,19 +30,8 @@ enum {
 
 /* Multipliers of hashes: odd, with bits at random; of a run, and its power HF_RUN. */
 #define HF_HASH_FACTOR UINT64_C(0x9E3779B97F4A7C15)
-#define HF_RUN_FACTOR UINT32_C(0x2C1B3C6D)
-#define HF_RUN_POWER UINT32_C(0x7E630F21)
-
-/* Return a hash of a number; that of 0 is not 0. */
-static uint32_t hf_hash(hf_real value, uint64_t lane)
-{
-    const double number = (double)value;
-    uint64_t bits;
-    memcpy(&bits, &number, sizeof bits);
-    bits = (bits ^ bits >> 32) + HF_HASH_FACTOR * (lane + 1);
-    bits *= HF_HASH_FACTOR;
-    return (uint32_t)((bits ^ bits >> 29) * HF_HASH_FACTOR >> 32);
-}
+#define HF_RUN_FACTOR UINT64_C(0X9E6C63D0876A9A4B)
+#define HF_RUN_POWER UINT64_C(0X2A9DAC3FAA9F06C1)
 
 /* Append a sample to the runs of the lanes. Return false if it changes nothing. */
 static bool hf_append_update(holdfast_laws *w, const hf_scan *scan)
@@ -52,33 +41,21 @@ static bool hf_append_update(holdfast_laws *w, const hf_scan *scan)
     const uint32_t *const newest = &w->recent[(w->n_updates + HF_RUN - 1) % HF_RUN * HF_LANES];
     uint32_t hashes[HF_LANES], changed = 0;
     for (size_t l = 0; l < HF_LANES; ++l) {
-        hashes[l] = hf_hash(scan->lanes.lane[l], l);
+        const double sum = (double)scan->lanes.lane[l];
+        uint64_t bits;
+        memcpy(&bits, &sum, sizeof bits);
+        hashes[l] = (uint32_t)(((bits ^ bits >> 32) + l + 1) * HF_HASH_FACTOR >> 32);
         changed |= hashes[l] ^ newest[l];
     }
-    for (size_t l = 0; changed && l < HF_LANES; ++l) {
+    if (!changed) {
+        return false;
+    }
+    for (size_t l = 0; l < HF_LANES; ++l) {
         w->runs[l] = w->runs[l] * HF_RUN_FACTOR + hashes[l] - oldest[l] * HF_RUN_POWER;
         oldest[l] = hashes[l];
     }
-    w->n_updates += changed != 0;
-    return changed != 0;
-}
-
-/* Return the marks that have one of the keys as bits. */
-static uint64_t hf_find_marks(const holdfast_laws *w, const uint32_t keys[HF_LANES])
-{
-    uint32_t any = 0;
-    for (size_t l = 0; l < HF_LANES; ++l) {
-        for (size_t m = 0; m < HF_N_MARKS; ++m) {
-            any |= w->marks[l * HF_N_MARKS + m] == keys[l];
-        }
-    }
-    uint64_t found = 0;
-    for (size_t m = 0; any && m < HF_N_MARKS; ++m) {
-        for (size_t l = 0; l < HF_LANES; ++l) {
-            found |= (uint64_t)(w->marks[l * HF_N_MARKS + m] == keys[l]) << m;
-        }
-    }
-    return found;
+    w->n_updates += 1;
+    return true;
 }
 
 /* Return whether three of the last updates differ without a lane. Two in turn are no ring: readings
@@ -86,73 +63,68 @@ static uint64_t hf_find_marks(const holdfast_laws *w, const uint32_t keys[HF_LAN
 static bool hf_has_three_readings(const holdfast_laws *w, size_t left_out)
 {
     uint32_t sums[HF_RUN] = {0}, second = 0;
-    bool has_second = false;
     for (size_t k = 0; k < HF_RUN; ++k) {
         for (size_t l = 0; l < HF_LANES; ++l) {
             sums[k] += l == left_out ? 0 : w->recent[k * HF_LANES + l];
         }
-        if (has_second && sums[k] != sums[0] && sums[k] != second) {
+        if (sums[k] != sums[0] && second != 0 && sums[k] != second) {
             return true;
         }
-        second = has_second ? second : sums[k];
-        has_second |= sums[k] != sums[0];
+        second = sums[k] != sums[0] ? sums[k] : second;
     }
     return false;
 }
 
-/* Return the channels that vary without a lane: that change now, or did when their taxel last did,
- * within two runs. */
-static size_t hf_n_varying(const hf_finger *f, size_t left_out)
+/* Return whether enough channels vary without a lane: change now, or did when their taxel last did,
+ * within a run. */
+static bool hf_do_vary(const hf_finger *f, size_t left_out)
 {
     size_t n_varying = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        const bool is_recent = f->state->n_changes - f->taxels[i].changed_at < 2 * HF_RUN;
+        const bool is_recent = f->state->n_changes - f->taxels[i].changed_at < HF_RUN;
         for (size_t k = i; i % HF_LANES != left_out && k < 3 * f->n; k += f->n) {
-            n_varying +=
-                f->readings[k] != f->previous[k] || (is_recent && f->changes[k] != 0);
+            n_varying += f->readings[k] != f->previous[k] || (is_recent && f->changes[k] != 0);
         }
     }
-    return n_varying;
+    return n_varying >= (left_out < HF_LANES ? HF_MIN_RETURNED : HF_MIN_VARYING);
 }
 
 /* Return whether readings return in order, of all taxels but those of one lane at most.
  *
  * Every HF_RUN-th update is marked: by four keys, each of which is a hash of the last HF_RUN
- * updates without one lane. An update returns if it has a key of a mark. Of any lag, one of HF_RUN
- * updates in a row does; so a return that lasts for 2 HF_RUN updates is found after HF_RUN - 1
- * more at most. */
+ * updates without one lane. An update returns if it has the key of a mark. Of any lag, one of
+ * HF_RUN updates in a row meets a mark: a return that goes on is found after HF_RUN - 1 more. */
 static bool hf_return(const hf_finger *f)
 {
     holdfast_laws *const w = f->laws;
-    if (w->n_updates < HF_RUN) {
-        return false;
-    }
-    uint32_t keys[HF_LANES];
+    const uint64_t sum = (w->runs[0] + w->runs[1]) + (w->runs[2] + w->runs[3]);
+    const size_t mark = w->n_updates / HF_RUN % HF_N_MARKS;
+    const bool is_mark = w->n_updates % HF_RUN == 0;
+    uint64_t keys[HF_LANES];
+    uint16_t is_near = 0;
     for (size_t l = 0; l < HF_LANES; ++l) {
-        keys[l] = (w->runs[0] + w->runs[1]) + (w->runs[2] + w->runs[3]) - w->runs[l];
+        keys[l] = sum - w->runs[l];
+        const uint16_t tag = (uint16_t)(keys[l] >> 48);
+        for (size_t m = 0; m < HF_N_MARKS; ++m) {
+            is_near |= w->tags[l * HF_N_MARKS + m] == tag;
+        }
     }
-    const uint64_t found = hf_find_marks(w, keys);
-    uint64_t *const before = &w->matches[w->n_updates % HF_RUN];
-    /* The update HF_RUN before has returned to the mark before. */
-    const uint64_t lasting = found & (*before << 1 | *before >> (HF_N_MARKS - 1));
-    *before = found;
     w->n_returning -= w->n_returning > 0;
-    for (size_t m = 0; lasting && m < HF_N_MARKS; ++m) {
-        size_t left_out = HF_LANES, n_equal = 0;
+    for (size_t m = 0; is_near && m < HF_N_MARKS; ++m) {
+        size_t left_out = 0, n_equal = 0;
         for (size_t l = 0; l < HF_LANES; ++l) {
             const bool is_equal = w->marks[l * HF_N_MARKS + m] == keys[l];
             left_out = is_equal ? l : left_out;
             n_equal += is_equal;
         }
-        left_out = n_equal == 1 ? left_out : HF_LANES;
-        const size_t least = n_equal == 1 ? HF_MIN_RETURNED : HF_MIN_VARYING;
-        if (lasting >> m & 1 && hf_has_three_readings(w, left_out) &&
-            hf_n_varying(f, left_out) >= least) {
+        left_out = n_equal > 1 ? HF_LANES : left_out; /* all returned */
+        if (n_equal > 0 && hf_has_three_readings(w, left_out) && hf_do_vary(f, left_out)) {
             w->n_returning = HF_RUN;
         }
     }
-    for (size_t l = 0; w->n_updates % HF_RUN == 0 && l < HF_LANES; ++l) {
-        w->marks[l * HF_N_MARKS + w->n_updates / HF_RUN % HF_N_MARKS] = keys[l];
+    for (size_t l = 0; is_mark && l < HF_LANES; ++l) {
+        w->marks[l * HF_N_MARKS + mark] = keys[l];
+        w->tags[l * HF_N_MARKS + mark] = (uint16_t)(keys[l] >> 48);
     }
     return w->n_returning > 0;
 }
@@ -164,40 +136,36 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
      * rest is the longest so far of any axis, and that of the others now: a skin with little noise
      * rests. */
     holdfast_laws *const w = f->laws;
-    const hf_real least = HF_FROZEN_SECONDS / f->hand->period;
+    const hf_real *const now = scan->axes;
+    const hf_real then[3] = {w->axes[0], w->axes[1], w->axes[2]};
+    memcpy(w->axes, now, sizeof w->axes);
+    if (!w->is_resting && now[0] != then[0] && now[1] != then[1] && now[2] != then[2] &&
+        now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) {
+        return false; /* as usual */
+    }
     bool is_stuck = false;
-    int64_t longest = 0;
+    w->is_resting = false;
     for (size_t axis = 0; axis < 3; ++axis) {
-        longest = w->longest[axis] > longest ? w->longest[axis] : longest;
-    }
-    for (size_t axis = 0; axis < 3; ++axis) {
-        const size_t next = (axis + 1) % 3;
-        const bool has_changed = scan->axes[axis] != w->axes[axis];
-        int64_t rest = longest;
+        int64_t *const same = &w->n_same[axis];
+        const bool is_new = now[axis] != then[axis];
+        w->n_equal[axis] = now[axis] == now[(axis + 1) % 3] ? w->n_equal[axis] + is_new : 0;
+        int64_t rest = w->longest_rest;
         for (size_t other = 0; other < 3; ++other) { /* not of those that froze together */
-            if (w->n_same[other] > rest && w->n_same[other] != w->n_same[axis] &&
-                w->n_changed[other] > 0) {
-                rest = w->n_same[other];
-            }
+            const bool rests = w->n_same[other] < *same && w->n_rested[other] < w->n_updates;
+            rest = rests && w->n_same[other] > rest ? w->n_same[other] : rest;
         }
-        const bool is_frozen =
-            w->n_changed[axis] >= HF_MIN_AXIS_CHANGES &&
-            (hf_real)w->n_same[axis] >= hf_max(least, HF_FROZEN_RATIO * (hf_real)(rest + 1));
-        if (!has_changed) {
-            w->n_same[axis] += 1;
-            is_stuck |= is_frozen && scan->axes[axis] != 0;
-        } else {
-            if (!is_frozen && w->n_same[axis] > w->longest[axis]) {
-                w->longest[axis] = w->n_same[axis];
-            }
-            w->n_same[axis] = 0;
-            w->n_changed[axis] += w->n_changed[axis] < HF_MIN_AXIS_CHANGES;
+        const int64_t n_changed = (int64_t)(w->n_updates - w->n_rested[axis]);
+        const hf_real least = HF_FROZEN_RATIO * (hf_real)(rest + 1);
+        const bool is_frozen = n_changed >= HF_MIN_AXIS_CHANGES &&
+                               (hf_real)*same >= hf_max(HF_FROZEN_SECONDS / f->hand->period, least);
+        if (is_new && *same > w->longest_rest && !is_frozen) {
+            w->longest_rest = *same;
         }
-        const bool is_equal = scan->axes[axis] == scan->axes[next];
-        w->n_equal[axis] = is_equal ? w->n_equal[axis] + has_changed : 0;
-        is_stuck |= w->n_equal[axis] >= HF_MIN_SHARED;
+        *same = is_new ? 0 : *same + 1;
+        w->n_rested[axis] += !is_new;
+        w->is_resting |= *same > 0 || w->n_equal[axis] > 0;
+        is_stuck |= w->n_equal[axis] >= HF_MIN_SHARED || (is_frozen && !is_new && now[axis] != 0);
     }
-    memcpy(w->axes, scan->axes, sizeof w->axes);
     return is_stuck;
 }
 
@@ -209,70 +177,67 @@ static bool hf_are_alike(const hf_finger *f, size_t i, size_t j)
     return r[i] == r[j] && r[n + i] == r[n + j] && r[2 * n + i] == r[2 * n + j];
 }
 
-/* Go on to the next taxel, and find those that have its reading now, if it has just changed. */
-static void hf_find_alike(const hf_finger *f)
+/* Return whether the reading of a taxel has changed. */
+static bool hf_has_moved(const hf_finger *f, size_t i)
 {
-    holdfast_laws *const w = f->laws;
-    const size_t n = f->n, i = w->taxel = (w->taxel + 1) % f->n_taxels;
-    const hf_real *const now = f->readings, *const then = f->previous;
-    if ((now[i] == then[i] && now[n + i] == then[n + i] && now[2 * n + i] == then[2 * n + i]) ||
-        !hf_has_reading(now, n, i) || f->used[i] == 0) {
-        return;
-    }
-    size_t n_near = 0;
-    for (size_t j = 0; j < f->n_taxels; ++j) {
-        n_near += now[j] == now[i];
-    }
-    bool has_alike = false;
-    for (size_t j = 0; n_near > 1 && j < f->n_taxels; ++j) {
-        if (j != i && hf_are_alike(f, i, j)) {
-            hf_include(&w->alike, j);
-            has_alike = true;
-        }
-    }
-    if (!has_alike && w->has_equals) { /* no more */
-        const uint64_t bit = (uint64_t)1 << i % 64;
-        w->equals.words[i / 64] &= ~bit;
-        w->has_equals = !hf_is_empty(f, &w->equals);
-    }
-    w->n_watched = w->n_alike = 0;
+    const hf_real *const now = f->readings + i, *const then = f->previous + i;
+    const size_t n = f->n;
+    return now[0] != then[0] || now[n] != then[n] || now[2 * n] != then[2 * n];
 }
 
-/* Compare one taxel with the others, until it has changed 20 times, or no other is equal. */
-static void hf_compare_taxel(const hf_finger *f)
+/* Go on to the next taxel. Watch those that are equal to it, if it has just changed. */
+static void hf_begin_watch(const hf_finger *f)
 {
     holdfast_laws *const w = f->laws;
-    const size_t n = f->n, i = w->taxel;
-    const hf_real now[3] = {f->readings[i], f->readings[n + i], f->readings[2 * n + i]};
+    const size_t i = w->taxel = w->taxel + 1 < f->n_taxels ? w->taxel + 1 : 0;
+    const hf_wide none = {0}, one = none + 1, own = none + f->readings[i];
+    hf_wide counts = none; /* of x, of which most differ */
+    for (size_t j = 0; j < f->n; j += HF_WIDTH) {
+        counts += hf_where(hf_load(f->readings + j) == own, one, none);
+    }
+    hf_real n_near[HF_WIDTH], n_equal = 0;
+    hf_store(n_near, counts);
+    for (size_t l = 0; l < HF_WIDTH; ++l) {
+        n_equal += n_near[l];
+    }
+    if ((n_equal <= 1 && !w->has_equals) || !hf_has_moved(f, i) ||
+        !hf_has_reading(f->readings, f->n, i)) {
+        return;
+    }
+    for (size_t j = 0; j < f->n_taxels; ++j) {
+        if (j != i && hf_are_alike(f, i, j)) {
+            hf_include(&w->alike, j);
+            w->is_watching = true;
+        }
+    }
+    w->n_watched = w->n_alike = 0;
+    if (!w->is_watching) { /* it is equal to none any more */
+        w->equals.words[i / 64] &= ~((uint64_t)1 << i % 64);
+        w->has_equals = !hf_is_empty(f, &w->equals);
+    }
+}
+
+/* Compare a taxel with those that are watched, until it has changed 20 times. */
+static void hf_go_on_watching(const hf_finger *f)
+{
+    holdfast_laws *const w = f->laws;
+    const size_t i = w->taxel;
     w->n_watched += 1;
-    w->n_alike +=
-        now[0] != w->reading[0] || now[1] != w->reading[1] || now[2] != w->reading[2];
+    w->n_alike += hf_has_moved(f, i);
     for (size_t j = 0; j < f->n_taxels; ++j) {
         if (hf_has(&w->alike, j) && !hf_are_alike(f, i, j)) {
             w->alike.words[j / 64] &= ~((uint64_t)1 << j % 64);
         }
     }
-    if (w->n_alike >= HF_MIN_SHARED && !hf_is_empty(f, &w->alike)) {
+    w->is_watching = !hf_is_empty(f, &w->alike) && w->n_watched < HF_MAX_WATCHED;
+    if (w->is_watching && w->n_alike >= HF_MIN_SHARED) {
         hf_include(&w->alike, i);
         hf_unite(f, &w->equals, &w->alike);
         w->has_equals = true;
+        w->is_watching = false;
     }
-    if (w->n_alike >= HF_MIN_SHARED || w->n_watched >= HF_MAX_WATCHED) {
+    if (!w->is_watching) {
         hf_clear(&w->alike);
-    }
-}
-
-/* Find taxels that are equal while they change: one taxel at an update is compared with all. */
-static void hf_find_equal_taxels(const hf_finger *f)
-{
-    holdfast_laws *const w = f->laws;
-    if (hf_is_empty(f, &w->alike)) {
-        hf_find_alike(f);
-    } else {
-        hf_compare_taxel(f);
-    }
-    for (size_t axis = 0; axis < 3; ++axis) {
-        w->reading[axis] = f->readings[axis * f->n + w->taxel];
     }
 }
 
@@ -290,7 +255,11 @@ HF_SHARED uint32_t hf_broken_laws(const hf_finger *f, const hf_scan *scan)
     if (hf_has_stuck_axis(f, scan)) {
         w->faults |= HOLDFAST_STUCK;
     }
-    hf_find_equal_taxels(f);
+    if (w->is_watching) {
+        hf_go_on_watching(f);
+    } else if (w->n_updates % 2 == 0) { /* to save time */
+        hf_begin_watch(f);
+    }
     return w->faults;
 }
 
@@ -300,32 +269,31 @@ HF_SHARED void hf_find_fallen_taxels(const hf_finger *f, bool after_gap)
     /* P2 < L / 100, with the least L = max(P2, 0.9 L) of the taxel so far. */
     holdfast_finger_memory *const s = f->state;
     const hf_real period = f->hand->period;
-    const double turns = (double)(HF_LEVEL_SECONDS / period);
-    const int64_t interval = turns > 1 ? (int64_t)lrint(turns) : 1;
-    if (after_gap) {
-        f->laws->settled_at = s->n_changes;
-    }
-    if (s->n_changes % interval == 0) {
-        const bool settled =
-            (hf_real)(s->n_changes - f->laws->settled_at) * period >= HF_SETTLING_SECONDS;
-        hf_clear(&f->laws->fallen);
-        f->laws->has_fallen = false;
-        for (size_t i = 0; settled && i < f->n_taxels; ++i) {
+    holdfast_laws *const w = f->laws;
+    w->n_settled = after_gap ? 0 : w->n_settled + 1;
+    w->n_levelled += 1;
+    if ((hf_real)w->n_levelled * period >= HF_LEVEL_SECONDS) {
+        const bool is_settled = (hf_real)w->n_settled * period >= HF_SETTLING_SECONDS;
+        hf_clear(&w->fallen);
+        w->n_levelled = 0;
+        w->has_fallen = false;
+        for (size_t i = 0; is_settled && i < f->n_taxels; ++i) {
             const holdfast_taxel *const taxel = &f->taxels[i];
             const hf_real power = f->powers[f->n + i], level = f->levels[i];
             const bool is_live = 2 * taxel->n_changed > taxel->changed_at &&
                                  (hf_real)taxel->longest_still * period < HF_FROZEN_SECONDS;
             if (is_live && power < HF_FALLEN_SHARE * level) {
-                hf_include(&f->laws->fallen, i);
-                f->laws->has_fallen = true;
+                hf_include(&w->fallen, i);
+                w->has_fallen = true;
             } else if (f->used[i] > 0) {
-                f->levels[i] = level > 0 ? hf_min(level, hf_max(power, HF_LEVEL_DECAY * level)) : power;
+                const hf_real lower = hf_min(level, hf_max(power, HF_LEVEL_DECAY * level));
+                f->levels[i] = level > 0 ? lower : power;
             }
         }
     }
-    if (f->laws->has_fallen) {
+    if (w->has_fallen) {
         s->taxel_faults |= HOLDFAST_STUCK;
-        hf_unite(f, &s->faulty_taxels, &f->laws->fallen);
+        hf_unite(f, &s->faulty_taxels, &w->fallen);
     }
 }
 

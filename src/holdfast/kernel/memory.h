@@ -35,27 +35,29 @@ typedef struct {
     /* Time: */
     uint64_t n_updates;
     uint32_t recent[HF_RUN * HF_LANES];    /* of each of the last updates, a hash of each lane */
-    uint32_t runs[HF_LANES];               /* of each lane, a hash of these */
-    uint32_t marks[HF_LANES * HF_N_MARKS]; /* of every HF_RUN-th update, see hf_return */
-    uint64_t matches[HF_RUN];              /* marks that each of the last updates returned to */
+    uint64_t runs[HF_LANES];               /* of each lane, a hash of these */
+    uint64_t marks[HF_LANES * HF_N_MARKS]; /* of every HF_RUN-th update, see hf_return */
+    uint16_t tags[HF_LANES * HF_N_MARKS];  /* their upper bits: these are searched */
     int32_t n_returning;                   /* updates for which a return is still reported */
     /* Axes: */
     hf_real axes[3];      /* sums of the readings */
-    int64_t n_changed[3]; /* updates that changed them; at most HF_MIN_AXIS_CHANGES */
-    int64_t n_same[3];    /* updates since */
-    int64_t longest[3];   /* most of these that were no fault */
+    uint64_t n_rested[3]; /* updates that left an axis as it was */
+    int64_t n_same[3];    /* the last of these in a row */
     int64_t n_equal[3];   /* changes of the axis while it was equal to the next one */
+    int64_t longest_rest; /* most updates in a row that left an axis as it was, if by no fault */
+    bool is_resting;      /* some axis did not change, or is equal to another */
     /* Taxels: */
     size_t taxel;              /* that is compared with the others at this update */
-    hf_real reading[3];        /* its last */
-    holdfast_taxel_set alike;  /* taxels that have been equal to it for some updates */
+    bool is_watching;          /* some have been equal to it for some updates */
+    holdfast_taxel_set alike;  /* these */
     int32_t n_watched;         /* these updates */
     int32_t n_alike;           /* those that changed it */
     holdfast_taxel_set equals; /* taxels that break the law */
     bool has_equals;           /* there are some */
     holdfast_taxel_set fallen; /* taxels whose noise has gone */
     bool has_fallen;           /* there are some */
-    int64_t settled_at;        /* n_changes of the finger at the last gap */
+    int64_t n_settled;         /* updates since the last gap */
+    int64_t n_levelled;        /* updates since these taxels were looked for */
     /* Modules: */
     hf_real total;     /* weighted sum of the readings, see hf_scan; NaN if they are not valid */
     bool has_changed;  /* with the last sample */
