@@ -14,15 +14,16 @@ enum {
     HF_MIN_RETURNED = 9,  /* the same, where a lane of the taxels is left out */
     HF_MIN_SHARED = 20,   /* changes for which taxels, axes or fingers are equal by a fault */
     HF_MAX_WATCHED = 160, /* updates in which a taxel must change so often, to be compared */
-    HF_MIN_AXIS_CHANGES = 10 /* from which the past of an axis shows how long it rests */
+    HF_MAX_STILL = 8      /* updates that leave a taxel as it is, at most, of one with noise */
 };
-/* An axis is frozen if it rests for this long [s], and for this many times as long as any ever
- * did. */
+/* An axis is frozen if it rests for this long [s], and for this many times as long as ever. */
 #define HF_FROZEN_SECONDS ((hf_real)0.5)
 #define HF_FROZEN_RATIO ((hf_real)10)
 /* Time between comparisons of the noise of the taxels, and time after a gap without one [s]. */
 #define HF_LEVEL_SECONDS ((hf_real)0.25)
 #define HF_SETTLING_SECONDS ((hf_real)1)
+/* Time for which the noise must have kept its level [s]. */
+#define HF_STEADY_SECONDS ((hf_real)5)
 /* Share of the second differences that are left when noise has gone: a tenth, squared. */
 #define HF_FALLEN_SHARE ((hf_real)0.01)
 /* The level follows lower ones by this factor: a hundredth takes it 11 s. */
@@ -76,12 +77,12 @@ static bool hf_has_three_readings(const holdfast_laws *w, size_t left_out)
 }
 
 /* Return whether enough channels vary without a lane: change now, or did when their taxel last did,
- * within a run. */
+ * while readings returned. */
 static bool hf_do_vary(const hf_finger *f, size_t left_out)
 {
     size_t n_varying = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        const bool is_recent = f->state->n_changes - f->taxels[i].changed_at < HF_RUN;
+        const bool is_recent = f->state->n_changes - f->taxels[i].changed_at < HF_RUN + f->laws->n_returned;
         for (size_t k = i; i % HF_LANES != left_out && k < 3 * f->n; k += f->n) {
             n_varying += f->readings[k] != f->previous[k] || (is_recent && f->changes[k] != 0);
         }
@@ -98,7 +99,7 @@ static bool hf_return(const hf_finger *f)
 {
     holdfast_laws *const w = f->laws;
     const uint64_t sum = (w->runs[0] + w->runs[1]) + (w->runs[2] + w->runs[3]);
-    const size_t mark = w->n_updates / HF_RUN % HF_N_MARKS;
+    const size_t mark = (size_t)(w->n_updates / HF_RUN % HF_N_MARKS);
     const bool is_mark = w->n_updates % HF_RUN == 0;
     uint64_t keys[HF_LANES];
     uint16_t is_near = 0;
@@ -109,7 +110,9 @@ static bool hf_return(const hf_finger *f)
             is_near |= w->tags[l * HF_N_MARKS + m] == tag;
         }
     }
-    w->n_returning -= w->n_returning > 0;
+    w->n_left -= w->n_left > 0;
+    w->n_returned = w->n_left > 0 ? w->n_returned + 1 : 0;
+    w->is_repeated &= w->n_left > 0;
     for (size_t m = 0; is_near && m < HF_N_MARKS; ++m) {
         size_t left_out = 0, n_equal = 0;
         for (size_t l = 0; l < HF_LANES; ++l) {
@@ -118,23 +121,23 @@ static bool hf_return(const hf_finger *f)
             n_equal += is_equal;
         }
         left_out = n_equal > 1 ? HF_LANES : left_out; /* all returned */
-        if (n_equal > 0 && hf_has_three_readings(w, left_out) && hf_do_vary(f, left_out)) {
-            w->n_returning = HF_RUN;
+        if (n_equal > 0 && hf_has_three_readings(w, left_out)) {
+            w->n_left = HF_RUN;
+            w->is_repeated = w->is_repeated || hf_do_vary(f, left_out);
         }
     }
     for (size_t l = 0; is_mark && l < HF_LANES; ++l) {
         w->marks[l * HF_N_MARKS + mark] = keys[l];
         w->tags[l * HF_N_MARKS + mark] = (uint16_t)(keys[l] >> 48);
     }
-    return w->n_returning > 0;
+    return w->is_repeated;
 }
 
 /* Return whether an axis of all taxels is frozen, or equal to another, while others change. */
 static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
 {
-    /* Frozen: changed 10 times, and the same for max(0.5 s, 10 (rest + 1 sample)) of updates, where
-     * rest is the longest so far of any axis, and that of the others now: a skin with little noise
-     * rests. */
+    /* Frozen: more than half of the updates before the rest changed it, 0.5 s of updates at least,
+     * and the rest lasts max(0.5 s, 10 (longest rest before + 1 sample)) of updates. */
     holdfast_laws *const w = f->laws;
     const hf_real *const now = scan->axes;
     const hf_real then[3] = {w->axes[0], w->axes[1], w->axes[2]};
@@ -143,27 +146,22 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
         now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) {
         return false; /* as usual */
     }
+    const hf_real least = HF_FROZEN_SECONDS / f->hand->period;
     bool is_stuck = false;
     w->is_resting = false;
     for (size_t axis = 0; axis < 3; ++axis) {
-        int64_t *const same = &w->n_same[axis];
         const bool is_new = now[axis] != then[axis];
-        w->n_equal[axis] = now[axis] == now[(axis + 1) % 3] ? w->n_equal[axis] + is_new : 0;
-        int64_t rest = w->longest_rest;
-        for (size_t other = 0; other < 3; ++other) { /* not of those that froze together */
-            const bool rests = w->n_same[other] < *same && w->n_rested[other] < w->n_updates;
-            rest = rests && w->n_same[other] > rest ? w->n_same[other] : rest;
+        const int64_t same = w->n_same[axis], n_changed = w->n_updates - w->n_rested[axis];
+        const hf_real limit = HF_FROZEN_RATIO * (hf_real)(w->longest_rest[axis] + 1);
+        const bool is_frozen = 2 * n_changed > w->n_updates - same && (hf_real)n_changed >= least &&
+                               (hf_real)same >= hf_max(least, limit);
+        if (is_new && same > w->longest_rest[axis] && !is_frozen) {
+            w->longest_rest[axis] = same;
         }
-        const int64_t n_changed = (int64_t)(w->n_updates - w->n_rested[axis]);
-        const hf_real least = HF_FROZEN_RATIO * (hf_real)(rest + 1);
-        const bool is_frozen = n_changed >= HF_MIN_AXIS_CHANGES &&
-                               (hf_real)*same >= hf_max(HF_FROZEN_SECONDS / f->hand->period, least);
-        if (is_new && *same > w->longest_rest && !is_frozen) {
-            w->longest_rest = *same;
-        }
-        *same = is_new ? 0 : *same + 1;
+        w->n_same[axis] = is_new ? 0 : same + 1;
         w->n_rested[axis] += !is_new;
-        w->is_resting |= *same > 0 || w->n_equal[axis] > 0;
+        w->n_equal[axis] = now[axis] == now[(axis + 1) % 3] ? w->n_equal[axis] + is_new : 0;
+        w->is_resting |= !is_new || w->n_equal[axis] > 0;
         is_stuck |= w->n_equal[axis] >= HF_MIN_SHARED || (is_frozen && !is_new && now[axis] != 0);
     }
     return is_stuck;
@@ -263,32 +261,45 @@ HF_SHARED uint32_t hf_broken_laws(const hf_finger *f, const hf_scan *scan)
     return w->faults;
 }
 
-/* Note the taxels that are STUCK though a digit of theirs toggles: their noise has gone. */
+/* Find the taxels whose noise has gone, and let the levels follow the others. */
+static void hf_compare_levels(const hf_finger *f)
+{
+    /* P2 < L / 100, with the least L = max(P2, 0.9 L) of the taxel so far; L is known if none has
+     * fallen so far for 5 s. */
+    holdfast_laws *const w = f->laws;
+    const bool is_known = (hf_real)w->n_steady * HF_LEVEL_SECONDS >= HF_STEADY_SECONDS;
+    bool has_fallen = false;
+    hf_clear(&w->fallen);
+    for (size_t i = 0; i < f->n_taxels; ++i) {
+        const holdfast_taxel *const taxel = &f->taxels[i];
+        const hf_real power = f->powers[f->n + i], level = f->levels[i];
+        const bool is_noisy = taxel->n_changed > 0 && taxel->longest_still < HF_MAX_STILL;
+        if (is_noisy && power < HF_FALLEN_SHARE * level) {
+            has_fallen = true;
+            if (is_known) {
+                hf_include(&w->fallen, i);
+                continue;
+            }
+        }
+        const hf_real lower = hf_min(level, hf_max(power, HF_LEVEL_DECAY * level));
+        f->levels[i] = level > 0 && is_known ? lower : hf_min(level > 0 ? level : power, power);
+    }
+    w->has_fallen = has_fallen && is_known;
+    w->n_steady = has_fallen && !is_known ? 0 : w->n_steady + 1;
+}
+
+/* Note the taxels that are STUCK though a digit of theirs toggles. */
 HF_SHARED void hf_find_fallen_taxels(const hf_finger *f, bool after_gap)
 {
-    /* P2 < L / 100, with the least L = max(P2, 0.9 L) of the taxel so far. */
     holdfast_finger_memory *const s = f->state;
-    const hf_real period = f->hand->period;
     holdfast_laws *const w = f->laws;
     w->n_settled = after_gap ? 0 : w->n_settled + 1;
     w->n_levelled += 1;
-    if ((hf_real)w->n_levelled * period >= HF_LEVEL_SECONDS) {
-        const bool is_settled = (hf_real)w->n_settled * period >= HF_SETTLING_SECONDS;
-        hf_clear(&w->fallen);
+    if ((hf_real)w->n_levelled * f->hand->period >= HF_LEVEL_SECONDS) {
         w->n_levelled = 0;
         w->has_fallen = false;
-        for (size_t i = 0; is_settled && i < f->n_taxels; ++i) {
-            const holdfast_taxel *const taxel = &f->taxels[i];
-            const hf_real power = f->powers[f->n + i], level = f->levels[i];
-            const bool is_live = 2 * taxel->n_changed > taxel->changed_at &&
-                                 (hf_real)taxel->longest_still * period < HF_FROZEN_SECONDS;
-            if (is_live && power < HF_FALLEN_SHARE * level) {
-                hf_include(&w->fallen, i);
-                w->has_fallen = true;
-            } else if (f->used[i] > 0) {
-                const hf_real lower = hf_min(level, hf_max(power, HF_LEVEL_DECAY * level));
-                f->levels[i] = level > 0 ? lower : power;
-            }
+        if ((hf_real)w->n_settled * f->hand->period >= HF_SETTLING_SECONDS) {
+            hf_compare_levels(f);
         }
     }
     if (w->has_fallen) {

@@ -33,18 +33,20 @@ typedef struct {
  * an update is a sample that changed a reading. */
 typedef struct {
     /* Time: */
-    uint64_t n_updates;
+    int64_t n_updates;
     uint32_t recent[HF_RUN * HF_LANES];    /* of each of the last updates, a hash of each lane */
     uint64_t runs[HF_LANES];               /* of each lane, a hash of these */
     uint64_t marks[HF_LANES * HF_N_MARKS]; /* of every HF_RUN-th update, see hf_return */
     uint16_t tags[HF_LANES * HF_N_MARKS];  /* their upper bits: these are searched */
-    int32_t n_returning;                   /* updates for which a return is still reported */
+    int64_t n_returned;                    /* updates since a return was found; 0 without one */
+    int32_t n_left;                        /* updates after which it is over, if no other is found */
+    bool is_repeated;                      /* enough readings and channels of it differ */
     /* Axes: */
     hf_real axes[3];      /* sums of the readings */
-    uint64_t n_rested[3]; /* updates that left an axis as it was */
+    int64_t n_rested[3];  /* updates that left an axis as it was */
     int64_t n_same[3];    /* the last of these in a row */
     int64_t n_equal[3];   /* changes of the axis while it was equal to the next one */
-    int64_t longest_rest; /* most updates in a row that left an axis as it was, if by no fault */
+    int64_t longest_rest[3]; /* most updates in a row that left it as it was, by no fault */
     bool is_resting;      /* some axis did not change, or is equal to another */
     /* Taxels: */
     size_t taxel;              /* that is compared with the others at this update */
@@ -58,6 +60,7 @@ typedef struct {
     bool has_fallen;           /* there are some */
     int64_t n_settled;         /* updates since the last gap */
     int64_t n_levelled;        /* updates since these taxels were looked for */
+    int64_t n_steady;          /* times that none had fallen */
     /* Modules: */
     hf_real total;     /* weighted sum of the readings, see hf_scan; NaN if they are not valid */
     bool has_changed;  /* with the last sample */
