@@ -82,7 +82,8 @@ static bool hf_do_vary(const hf_finger *f, size_t left_out)
 {
     size_t n_varying = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        const bool is_recent = f->state->n_changes - f->taxels[i].changed_at < HF_RUN + f->laws->n_returned;
+        const int64_t still = f->state->n_changes - f->taxels[i].changed_at;
+        const bool is_recent = still < HF_RUN + f->laws->n_returned;
         for (size_t k = i; i % HF_LANES != left_out && k < 3 * f->n; k += f->n) {
             n_varying += f->readings[k] != f->previous[k] || (is_recent && f->changes[k] != 0);
         }
@@ -273,8 +274,9 @@ static void hf_compare_levels(const hf_finger *f)
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const hf_real power = f->powers[f->n + i], level = f->levels[i];
-        const bool is_noisy = taxel->n_changed > 0 && taxel->longest_still < HF_MAX_STILL;
-        if (is_noisy && power < HF_FALLEN_SHARE * level) {
+        const bool is_lively = taxel->n_changed > 0 && taxel->longest_still < HF_MAX_STILL &&
+                               f->state->n_changes - taxel->changed_at < HF_MAX_STILL;
+        if (is_lively && power < HF_FALLEN_SHARE * level) {
             has_fallen = true;
             if (is_known) {
                 hf_include(&w->fallen, i);
