@@ -252,7 +252,11 @@ HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
 HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
 HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
 
+/* After this time without a sample, a recording that is played again may return [s]. */
+#define HF_PAUSE_SECONDS ((hf_real)0.5)
+
 /* laws.c */
+HF_SHARED void hf_forget_returns(const hf_finger *f);
 HF_SHARED uint32_t hf_broken_laws(const hf_finger *f, const hf_scan *scan);
 HF_SHARED void hf_find_fallen_taxels(const hf_finger *f, bool after_gap);
 HF_SHARED void hf_find_copies(

@@ -134,6 +134,14 @@ static bool hf_return(const hf_finger *f)
     return w->is_repeated;
 }
 
+/* Forget the readings to which a finger may return. */
+HF_SHARED void hf_forget_returns(const hf_finger *f)
+{
+    memset(f->laws->marks, 0, sizeof f->laws->marks);
+    memset(f->laws->tags, 0, sizeof f->laws->tags);
+    f->laws->n_left = 0;
+}
+
 /* Return whether an axis of all taxels is frozen, or equal to another, while others change. */
 static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
 {

@@ -187,6 +187,9 @@ static int32_t hf_process(const hf_finger *f, double time)
     const hf_real low = f->finger->low, high = f->finger->high;
     /* Haar windows begin again after any gap, also after one that windows in seconds bridge. */
     const bool after_gap = (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
+    if ((hf_real)(time - s->last_time) > HF_PAUSE_SECONDS) {
+        hf_forget_returns(f);
+    }
     hf_clear_values(v);
     s->last_time = time;
     s->field_speed = 0; /* a sample that is refused shows none */

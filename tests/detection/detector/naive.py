@@ -249,6 +249,9 @@ class Finger:
         readings = np.zeros_like(given)
         readings[self.used] = given[self.used]
         fresh = self.last is not None and time - self.last > 3.0003 * self.period
+        if self.last is not None and time - self.last > 0.5:
+            self.laws.pauses.append(len(self.laws.lanes))
+            self.laws.n_left = 0
         self.last, self.field_speed = time, 0.0
         self.force, self.sigma = (NAN, NAN, NAN), NAN
         low, high = self.sensor.range or (-math.inf, math.inf)

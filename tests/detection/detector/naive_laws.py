@@ -18,6 +18,7 @@ class Laws:
         self.n_taxels, self.period = n_taxels, period
         self.faults, self.equals, self.fallen = set(), set(), set()
         self.lanes, self.total, self.is_new = [], None, False
+        self.pauses = [0]  # numbers of updates before a pause
         self.n_left = self.n_returned = 0
         self.is_repeated = False
         self.changed = [[], [], []]  # of each axis, whether each update changed it
@@ -52,7 +53,7 @@ class Laws:
         self.n_left = max(0, self.n_left - 1)
         self.n_returned = self.n_returned + 1 if self.n_left else 0
         self.is_repeated = self.is_repeated and self.n_left > 0
-        marks = [m for m in range(16, n, 16) if n - m <= 512]
+        marks = [m for m in range(16, n, 16) if n - m <= 512 and m > self.pauses[-1]]
         for mark in marks:
             if self.run_before(n, None) == self.run_before(mark, None):
                 ways = [None]
