@@ -11,7 +11,7 @@ picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
 import argparse
 import io
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from PIL import Image
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detection import FingerTrace, Model, detect
+from holdfast.io import load_recording
 from holdfast.io.importers import import_recordings
 from holdfast.live.health import module_health
 from holdfast.live.module_checks import HoldDrift, ModuleComparison
@@ -231,10 +232,16 @@ def print_table(data: Path) -> None:
 LAWS = (Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.STUCK, Fault.COPIED)
 
 
+def recordings_of(folder: Path) -> Iterator[Recording]:
+    """Yield our recordings of a folder, or those of other programs."""
+    own = sorted(folder.glob("*.parquet"))
+    yield from map(load_recording, own) if own else import_recordings(folder)
+
+
 def print_healthy(folders: Sequence[Path]) -> None:
     """Print how often each law fires on recordings of healthy skins, by sensor."""
     rows: dict[str, Values] = {}
-    for recording in (each for folder in folders for each in import_recordings(folder)):
+    for recording in (each for folder in folders for each in recordings_of(folder)):
         for name, trace in detect(Model.load("builtin:any"), recording).fingers.items():
             bits = [trace.faults >> list(Fault).index(law) & 1 for law in LAWS]
             alarms = [(np.diff(bit, prepend=0) == 1).sum() for bit in bits]
@@ -284,6 +291,8 @@ def print_broken(recordings: Sequence[Recording], start: float) -> None:
         name, module = next(iter(recording.modules.items()))
         readings = module.readings.astype(np.float64)
         k = int(np.searchsorted(module.times, module.times[0] + start))
+        if k + 600 > len(readings):
+            continue
         noise = np.abs(np.diff(readings[:k], axis=0)).mean()
         for title, (fault, values) in broken(readings, k, module.sensor.step or noise / 50).items():
             made = Recording("made", {name: replace(module, readings=values)})
@@ -306,7 +315,7 @@ def main() -> None:
     options = parser.parse_args()
     if options.laws:
         print_healthy(options.laws)
-        firsts = (next(iter(import_recordings(folder))) for folder in options.laws)
+        firsts = (next(recordings_of(folder)) for folder in options.laws)
         print_broken(list(firsts), options.start)
     if options.out:
         draw(options.out / "faulty-sensors.png")

@@ -165,6 +165,33 @@ UNTRUE = {
     **{f"ring of {period}": ring(period) for period in (3, 10, 64)},
 }
 """Functions that spoil all samples of a finger."""
+
+
+def _equal_taxels(values, rng):
+    values[:, 1] = values[:, 4]
+
+
+def _frozen_axis(values, rng):
+    values[:, :, 0] = values[0, :, 0]
+
+
+def _equal_axes(values, rng):
+    values[:, :, 0] = values[:, :, 2]
+
+
+def _toggling(values, rng):
+    values[:] = values[0] + rng.integers(0, 2, values.shape)
+
+
+def _ring_with_a_living_taxel(values, rng):
+    values[:, 1:] = values[np.arange(len(values)) % 23, 1:]
+
+
+BROKEN = {
+    "equal taxels": _equal_taxels, "frozen axis": _frozen_axis, "equal axes": _equal_axes,
+    "toggling": _toggling, "living taxel": _ring_with_a_living_taxel,
+}  # fmt: skip
+"""Functions that break a law of a living skin (kernel/laws.c)."""
 FOUND = {
     "1 to 3 counts": {Fault.SATURATED, Fault.OFFSET},
     "near the upper end": {Fault.SATURATED, Fault.OFFSET},
@@ -526,10 +553,16 @@ def ailing(draw, n=700):
     values += np.rint(rng.normal(scale=30, size=(n, 1, 3)).cumsum(axis=0) * draw(st.booleans()))
     creep = draw(st.sampled_from([0.0, 0.05, 0.2, 1.0]))
     values[:, :, 2] += np.rint(creep * np.arange(n))[:, None]
-    ways = st.sampled_from(["still", "noise", "step", "zero", "limit", "beyond", "nan", *UNTRUE])
+    ways = st.sampled_from(
+        ["still", "noise", "step", "zero", "limit", "beyond", "nan", *BROKEN, *UNTRUE]
+    )
     drawn = draw(st.lists(ways, max_size=4))
     for way in drawn:
         taxel, start = draw(st.integers(0, 5)), draw(st.sampled_from([0, 60, 250, 400]))
+        if way in BROKEN:
+            part = values[start : start + draw(st.sampled_from([30, 100, 250]))]
+            BROKEN[way](part, rng)
+            continue
         if way in UNTRUE:
             part = values[start : start + draw(st.sampled_from([5, 100, 250]))]
             part[:] = UNTRUE[way](part)
