@@ -282,6 +282,9 @@ static void hf_compare_levels(const hf_finger *f)
     for (size_t i = 0; i < f->n_taxels; ++i) {
         const holdfast_taxel *const taxel = &f->taxels[i];
         const hf_real power = f->powers[f->n + i], level = f->levels[i];
+        if (hf_has(&f->values->taxels, i)) { /* its reading is replaced */
+            continue;
+        }
         const bool is_lively = taxel->n_changed > 0 && taxel->longest_still < HF_MAX_STILL &&
                                f->state->n_changes - taxel->changed_at < HF_MAX_STILL;
         if (is_lively && power < HF_FALLEN_SHARE * level) {

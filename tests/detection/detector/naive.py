@@ -288,6 +288,7 @@ class Finger:
                 return self.refuse(faults, invalid)
         invalid |= offsets
         self.watch_life(readings, time)
+        self.invalid = invalid
         if implausible := self.implausible(readings):
             return self.refuse(faults | implausible, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)
@@ -605,7 +606,7 @@ class Finger:
         if self.sensor.magnetic and self.n_news % every == 0:
             axis = self.n_news // every % 3
             self.stuck_axes[axis] = self.compare_axis(axis, now, low, high)
-        self.laws.compare_levels(self.taxels, self.n_news, fresh)
+        self.laws.compare_levels(self.taxels, self.n_news, fresh, self.invalid)
         stuck |= set().union(*self.stuck_axes, self.laws.fallen)
         noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}

@@ -109,7 +109,7 @@ class Laws:
                 if not self.alike:
                     self.equals.discard(i)
 
-    def compare_levels(self, taxels, n_news, fresh):
+    def compare_levels(self, taxels, n_news, fresh, invalid):
         self.n_settled = 0 if fresh else self.n_settled + 1
         self.n_levelled += 1
         if self.n_levelled * self.period < 0.25:
@@ -119,6 +119,8 @@ class Laws:
             return
         is_known, low = self.n_steady * 0.25 >= 5, set()
         for i, taxel in taxels.items():
+            if i in invalid:
+                continue
             power = taxel.smooth(n_news)[1]
             level = self.levels.get(i, 0.0) or power
             lively = taxel.changed and max(taxel.longest, n_news - taxel.at) < 8

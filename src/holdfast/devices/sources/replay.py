@@ -174,7 +174,7 @@ class Player(Source):
         if self._loops and n_samples < MIN_LOOP_SAMPLES:
             self.hint = (
                 f"{self.name} has {n_samples} samples, less than {MIN_LOOP_SAMPLES}: its end meets "
-                f"its begin, after a pause of {PAUSE:g} s; without the pause it is the fault repeated"
+                f"its begin after {PAUSE:g} s; without that pause it is `repeated`"
             )
         if not first.complete:
             self._notices.append(f"{self.name} was cut off; what could be recovered is played")
