@@ -101,14 +101,6 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
     Fault.COPIED: FaultText(
         "copied", "fingers have the same readings: one sensor is read twice; check the channels"
     ),
-    Fault.EQUAL_TAXELS: FaultText(
-        "equal taxels",
-        "taxels have the same readings while they change: check the cable and the channels, or "
-        "leave them out by --ignore FINGER:TAXEL",
-    ),
-    Fault.COPIED: FaultText(
-        "copied", "fingers have the same readings: one sensor is read twice; check the channels"
-    ),
     Fault.SLOW: FaultText(
         "slow",
         "readings change less than 30 times a second, and are repeated between: raise the rate of "
