@@ -2,6 +2,7 @@
 
     python benchmarks/faulty_sensors.py --out docs/img    # faulty-sensors.png, health.png
     python benchmarks/faulty_sensors.py --data DATA       # a table
+    python benchmarks/faulty_sensors.py --laws FOLDER ... # laws of a living skin: two tables
 
 Before: the detector without what it knows of magnetometers (`Sensor.magnetic`). The readings of the
 picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
@@ -10,7 +11,7 @@ picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
 import argparse
 import io
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from PIL import Image
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detection import FingerTrace, Model, detect
+from holdfast.io import load_recording
 from holdfast.io.importers import import_recordings
 from holdfast.live.health import module_health
 from holdfast.live.module_checks import HoldDrift, ModuleComparison
@@ -227,11 +229,94 @@ def print_table(data: Path) -> None:
             print(f"| `{name}` | {n_modules} | {n:.0f} | {title} | {shares} |")
 
 
+LAWS = (Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.STUCK, Fault.COPIED)
+
+
+def recordings_of(folder: Path) -> Iterator[Recording]:
+    """Yield our recordings of a folder, or those of other programs."""
+    own = sorted(folder.glob("*.parquet"))
+    yield from map(load_recording, own) if own else import_recordings(folder)
+
+
+def print_healthy(folders: Sequence[Path]) -> None:
+    """Print how often each law fires on recordings of healthy skins, by sensor."""
+    rows: dict[str, Values] = {}
+    for recording in (each for folder in folders for each in recordings_of(folder)):
+        for name, trace in detect(Model.load("builtin:any"), recording).fingers.items():
+            bits = [trace.faults >> list(Fault).index(law) & 1 for law in LAWS]
+            alarms = [(np.diff(bit, prepend=0) == 1).sum() for bit in bits]
+            minutes = (trace.times[-1] - trace.times[0]) / 60
+            row = rows.setdefault(recording.modules[name].sensor.name, np.zeros(3 + len(LAWS)))
+            row += [minutes, len(trace.state), (trace.state == UNKNOWN).sum(), *alarms]
+    print(f"| sensor | minutes | {' | '.join(LAWS)} | UNKNOWN [%] |")
+    for name, (minutes, n, n_unknown, *alarms) in sorted(rows.items()):
+        counts = " | ".join(f"{x:.0f}" for x in alarms)
+        print(f"| `{name}` | {minutes:.1f} | {counts} | {100 * n_unknown / n:.2f} |")
+
+
+def broken(readings: Values, start: int, digit: float) -> dict[str, tuple[Fault, Values]]:
+    """Return readings (n, n_taxels, 3) that break each law from a sample on."""
+    n, rng = len(readings) - start, np.random.default_rng(0)
+    busiest = np.argsort((np.diff(readings[start:], axis=0) != 0).any(axis=2).sum(axis=0))
+    first, second = busiest[-2:]
+    toggles = digit * rng.integers(0, 2, n)
+    cases = {}
+    for period in (10, 65, 300, 512):
+        made = readings.copy()
+        made[start:] = readings[start + np.arange(n) % period]
+        cases[f"ring of {period}"] = Fault.REPEATED, made
+        toggling = made.copy()
+        toggling[start:, first, 2] += toggles
+        cases[f"the same, one taxel toggles ({period})"] = Fault.REPEATED, toggling
+    for title, fault, taxels, axes, value in (
+        ("two equal taxels", Fault.EQUAL_TAXELS, first, slice(None), readings[start:, second]),
+        ("x frozen", Fault.STUCK, slice(None), 0, readings[start, :, 0]),
+        ("x equals y", Fault.STUCK, slice(None), 0, readings[start:, :, 1]),
+    ):
+        made = readings.copy()
+        made[start:, taxels, axes] = value
+        cases[title] = fault, made
+    made = readings.copy()
+    made[start:] = readings[start]
+    made[start:, :, 2] += toggles[:, None]
+    cases["all frozen, last bit toggles"] = Fault.STUCK, made
+    return cases
+
+
+def print_broken(recordings: Sequence[Recording], start: float) -> None:
+    """Print the time from a fault to its detection, and what is STABLE after it."""
+    print("| sensor | fault | found after [samples] | [s] | STABLE after it [%] |")
+    model = Model.load("builtin:any")
+    for recording in recordings:
+        name, module = next(iter(recording.modules.items()))
+        readings = module.readings.astype(np.float64)
+        k = int(np.searchsorted(module.times, module.times[0] + start))
+        if k + 600 > len(readings):
+            continue
+        noise = np.abs(np.diff(readings[:k], axis=0)).mean()
+        for title, (fault, values) in broken(readings, k, module.sensor.step or noise / 50).items():
+            made = Recording("made", {name: replace(module, readings=values)})
+            trace = detect(model, made).fingers[name]
+            found = k + np.flatnonzero(trace.faults[k:] >> list(Fault).index(fault) & 1)
+            row = "- | - | -"
+            if len(found):
+                at = found[0]
+                stable = 100 * (trace.state[at:] == STABLE).mean()
+                row = f"{at - k} | {trace.times[at] - trace.times[k]:.2f} | {stable:.0f}"
+            print(f"| `{module.sensor.name}` | {title} | {row} |")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, help="folder for the picture")
     parser.add_argument("--data", type=Path, help="folder with the real recordings")
+    parser.add_argument("--laws", type=Path, nargs="+", help="folders with healthy recordings")
+    parser.add_argument("--start", type=float, default=8.0, help="of a fault [s]")
     options = parser.parse_args()
+    if options.laws:
+        print_healthy(options.laws)
+        firsts = (next(recordings_of(folder)) for folder in options.laws)
+        print_broken(list(firsts), options.start)
     if options.out:
         draw(options.out / "faulty-sensors.png")
         draw_health(options.out / "health.png")

@@ -147,7 +147,7 @@ def test_the_live_threshold_is_that_of_the_sensor():
 
 def test_two_sensors_of_one_hand():
     other = sensor(name="other")
-    hand = recording(thumb=tactile(200), index=tactile(200, which=other))
+    hand = recording(thumb=tactile(200), index=tactile(200, 1, other))
     n = len(TAXELS)
     handling = replace(HANDLING, location=(0.2,) * n, scale=(0.5,) * n, thresholds={"stable": 0.31})
     part = finger_model(TAXELS, normalised=True, handling={"tiny": handling})

@@ -45,7 +45,7 @@ class TestEstimates:
     def estimate(self):
         detector = Detector(with_causes())
         for k, sample in enumerate(lively(60)):
-            estimate = detector.update({"thumb": sample, "index": sample}, k / 100)
+            estimate = detector.update({"thumb": sample, "index": sample + 1.0}, k / 100)
         return estimate
 
     def test_they_are_a_mapping(self, estimate):
@@ -151,7 +151,7 @@ class TestDetector:
 
         kernel = made_kernel(detector._plan, note)
         for k, sample in enumerate(lively(60)):
-            kernel.update({"thumb": sample, "index": sample}, k / 100)
+            kernel.update({"thumb": sample, "index": sample + 1.0}, k / 100)
         assert set(refused) == {"another thread is using this detector"}
 
     def test_a_cycle_through_what_it_calls_is_collected(self):

@@ -94,6 +94,8 @@ def play(
             print_message(
                 f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it"
             )
+            if hint := getattr(opened, "hint", ""):
+                print_message(hint)
             show_clients(server)
     if server.failure is not None:
         raise server.failure

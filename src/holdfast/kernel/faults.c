@@ -45,7 +45,7 @@
 HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
 {
     const size_t n = f->n;
-    hf_sum sum_x, sum_y, sum_z, minus_least, most;
+    hf_sum sum_x, sum_y, sum_z, lanes, minus_least, most;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide x = {0}, y = {0}, z = {0};
         const hf_wide none = x - HF_INFINITY;
@@ -66,12 +66,17 @@ HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings)
         hf_put(&sum_x, lane, x);
         hf_put(&sum_y, lane, y);
         hf_put(&sum_z, lane, z);
+        hf_put(&lanes, lane, x + HF_WEIGHT_Y * y + HF_WEIGHT_Z * z);
         hf_put(&most, lane, highest);
         hf_put(&minus_least, lane, lowest);
     }
+    const hf_real sums[3] = {hf_total(sum_x), hf_total(sum_y), hf_total(sum_z)};
     const hf_scan scan = {
-        hf_total(sum_x) + HF_WEIGHT_Y * hf_total(sum_y) + HF_WEIGHT_Z * hf_total(sum_z),
-        -hf_largest_lane(minus_least), hf_largest_lane(most)};
+        sums[0] + HF_WEIGHT_Y * sums[1] + HF_WEIGHT_Z * sums[2],
+        -hf_largest_lane(minus_least),
+        hf_largest_lane(most),
+        {sums[0], sums[1], sums[2]},
+        lanes};
     return scan;
 }
 
@@ -523,6 +528,7 @@ static void hf_find_taxel_faults(const hf_finger *f, bool after_gap)
             s->taxel_faults = HOLDFAST_STUCK;
         }
     }
+    hf_find_fallen_taxels(f, after_gap);
     if (changes.any_still) {
         hf_find_still_taxels(f);
     }

@@ -54,8 +54,8 @@ typedef struct {
     hf_real *powers;  /* (2, n) */
     holdfast_taxel *taxels;
     holdfast_mask *masks;
-    holdfast_ring *rings;
-    hf_real *sums;
+    hf_real *levels; /* (n) */
+    holdfast_laws *laws;
     hf_real *history;
     hf_real *blocks;
     holdfast_track *track;
@@ -244,6 +244,8 @@ typedef struct {
     hf_real total; /* weighted sum; finite if all readings are */
     hf_real least;
     hf_real most;
+    hf_real axes[3]; /* sum of each axis */
+    hf_sum lanes;    /* weighted sum of each lane */
 } hf_scan;
 
 /* faults.c */
@@ -257,6 +259,16 @@ HF_SHARED bool hf_is_stuck(const hf_finger *f);
 HF_SHARED bool hf_is_pulled(const hf_finger *f, hf_real normal);
 HF_SHARED bool hf_has_reading(const hf_real *readings, size_t n, size_t i);
 HF_SHARED void hf_track_changes(const hf_finger *f, double time, bool after_gap);
+
+/* After this time without a sample, a recording that is played again may return [s]. */
+#define HF_PAUSE_SECONDS ((hf_real)0.5)
+
+/* laws.c */
+HF_SHARED void hf_forget_returns(const hf_finger *f);
+HF_SHARED uint32_t hf_broken_laws(const hf_finger *f, const hf_scan *scan);
+HF_SHARED void hf_find_fallen_taxels(const hf_finger *f, bool after_gap);
+HF_SHARED void hf_find_copies(
+    const holdfast_hand *hand, holdfast_memory *memory, const bool *present);
 
 /* implausible.c */
 HF_SHARED void hf_take_out_jumps(const hf_finger *f);

@@ -12,6 +12,7 @@
 #include "window.c"
 
 #include "faults.c"
+#include "laws.c"
 #include "implausible.c"
 #include "tare.c"
 #include "field.c"

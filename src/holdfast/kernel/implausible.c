@@ -26,130 +26,6 @@
 /* Steps of noise, as a root mean square: the others are still below this many times as much. */
 #define HF_QUIET_STEPS ((hf_real)3)
 
-enum {
-    HF_MIN_PERIOD = 3,   /* of a ring: the shortest [samples] */
-    HF_LONG_PERIOD = 12, /* the first of the long ones */
-    HF_MAX_PERIOD = 64,  /* the longest */
-    HF_MIN_VARYING = 12  /* readings that change in a ring: few may repeat by chance */
-};
-
-/* Return the weighted sum of the readings `lag` samples ago. */
-static inline hf_real hf_sum_before(const hf_finger *f, uint64_t n, uint64_t lag)
-{
-    /* A lag beyond the first sample wraps round: the sum is NaN there. */
-    return f->sums[(n - lag) % HF_N_RING_SUMS];
-}
-
-/* Return the first lag of a range at which the sum of the readings was the same; else 0. */
-static uint64_t hf_equal_lag(
-    const hf_finger *f, uint64_t n, hf_real total, uint64_t begin, uint64_t end, uint64_t step)
-{
-    for (uint64_t lag = begin; lag < end; lag += step) {
-        if (hf_sum_before(f, n, lag) == total) {
-            return lag;
-        }
-    }
-    return 0;
-}
-
-/* Follow a ring, and count how many samples it has lasted, as far as the sums reach. */
-static void hf_begin_ring(const hf_finger *f, uint64_t period)
-{
-    holdfast_finger_memory *const s = f->state;
-    const uint64_t n = s->n_valid - 1;
-    uint64_t length = 1;
-    while (length + period < HF_N_RING_SUMS &&
-           hf_sum_before(f, n, length) == hf_sum_before(f, n, length + period)) {
-        ++length;
-    }
-    s->ring_period = period;
-    s->ring_length = length;
-    s->ring_age = 0;
-    s->ring_varies = false;
-    for (size_t i = 0; i < f->n_taxels; ++i) {
-        for (size_t axis = 0; axis < 3; ++axis) {
-            f->rings[i].anchor[axis] = f->readings[axis * f->n + i];
-            f->rings[i].varies[axis] = false;
-        }
-    }
-}
-
-/* Return whether three samples of a ring differ. Two in turn are no ring: readings with little
- * noise go to and fro by one step. */
-static bool hf_has_three_sums(const hf_finger *f)
-{
-    const uint64_t n = f->state->n_valid - 1;
-    const hf_real first = hf_sum_before(f, n, 0);
-    hf_real second = first;
-    for (uint64_t lag = 1; lag < f->state->ring_period; ++lag) {
-        const hf_real sum = hf_sum_before(f, n, lag);
-        if (sum != first && second == first) {
-            second = sum;
-        } else if (sum != first && sum != second) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* Return whether a ring that goes on has lasted for three periods, and is no rest. */
-static bool hf_has_repeated(const hf_finger *f)
-{
-    holdfast_finger_memory *const s = f->state;
-    s->ring_length += 1;
-    s->ring_age += 1;
-    if (s->ring_age <= s->ring_period) { /* one period is compared exactly */
-        size_t n_varying = 0;
-        bool is_equal = true;
-        for (size_t i = 0; i < f->n_taxels; ++i) {
-            for (size_t axis = 0; axis < 3; ++axis) {
-                if (f->readings[axis * f->n + i] != f->rings[i].anchor[axis]) {
-                    f->rings[i].varies[axis] = true;
-                    is_equal = false;
-                }
-                n_varying += f->rings[i].varies[axis];
-            }
-        }
-        if (s->ring_age == s->ring_period) {
-            if (!is_equal) {
-                s->ring_period = 0;
-                return false;
-            }
-            s->ring_varies = n_varying >= HF_MIN_VARYING && hf_has_three_sums(f);
-        }
-    }
-    return s->ring_varies && s->ring_length >= 2 * s->ring_period;
-}
-
-/* Return whether the last 3 p samples of a finger repeat with a period p.
- *
- * Samples are compared by their weighted sums, and one of each period exactly. A period that is
- * found is followed until a sample differs from that a period before; then another is sought. */
-static bool hf_follow_ring(const hf_finger *f, hf_real total)
-{
-    /* S(k) = S(k - p) for the last 2 p samples k. Each sample tries a third of the short periods
-     * and a ninth of the others: a ring is found so early that it is followed for a period by
-     * then. */
-    holdfast_finger_memory *const s = f->state;
-    const uint64_t n = s->n_valid;
-    s->n_valid = n + 1;
-    f->sums[n % HF_N_RING_SUMS] = total;
-    if (s->ring_period > 0) {
-        if (hf_sum_before(f, n, s->ring_period) == total) {
-            return hf_has_repeated(f);
-        }
-        s->ring_period = 0; /* equal by chance, or at an end */
-    }
-    uint64_t period = hf_equal_lag(f, n, total, HF_MIN_PERIOD + n % 3, HF_LONG_PERIOD, 3);
-    if (period == 0) {
-        period = hf_equal_lag(f, n, total, HF_LONG_PERIOD + n % 9, HF_MAX_PERIOD + 1, 9);
-    }
-    if (period > 0) {
-        hf_begin_ring(f, period);
-    }
-    return false;
-}
-
 /* Return whether more than half of the taxels have a reading near an end of the range. */
 static bool hf_is_near_end(const hf_finger *f, const hf_scan *scan)
 {
@@ -365,7 +241,7 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
 HF_SHARED uint32_t hf_find_implausible(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_finger_memory *const s = f->state;
-    uint32_t faults = hf_follow_ring(f, scan->total) ? HOLDFAST_REPEATED : 0;
+    uint32_t faults = hf_broken_laws(f, scan);
     if (hf_is_near_end(f, scan)) {
         faults |= HOLDFAST_SATURATED;
     }

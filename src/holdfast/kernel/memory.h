@@ -29,11 +29,45 @@ typedef struct {
     bool unweighed;          /* it is left out, and its share of the load is not known */
 } holdfast_mask;
 
-/* A taxel in a ring of samples that may repeat (implausible.c). */
+/* What shows whether a finger keeps the laws of a living skin (laws.c). 0 before the first sample;
+ * an update is a sample that changed a reading. */
 typedef struct {
-    hf_real anchor[3]; /* reading of the sample from which on the ring is followed */
-    bool varies[3];    /* the reading differed from it in the period after it */
-} holdfast_ring;
+    /* Time: */
+    int64_t n_updates;
+    uint32_t recent[HF_RUN * HF_LANES];    /* of each of the last updates, a hash of each lane */
+    uint64_t runs[HF_LANES];               /* of each lane, a hash of these */
+    uint64_t marks[HF_LANES * HF_N_MARKS]; /* of every HF_RUN-th update, see hf_return */
+    uint16_t tags[HF_LANES * HF_N_MARKS];  /* their upper bits: these are searched */
+    int64_t n_returned;                    /* updates since a return was found; 0 without one */
+    int32_t n_left;                        /* updates after which it is over, if no other is found */
+    bool is_repeated;                      /* enough readings and channels of it differ */
+    /* Axes: */
+    hf_real axes[3];      /* sums of the readings */
+    int64_t n_rested[3];  /* updates that left an axis as it was */
+    int64_t n_same[3];    /* the last of these in a row */
+    int64_t n_equal[3];   /* changes of the axis while it was equal to the next one */
+    int64_t longest_rest[3]; /* most updates in a row that left it as it was, by no fault */
+    bool is_resting;      /* some axis did not change, or is equal to another */
+    /* Taxels: */
+    size_t taxel;              /* that is compared with the others at this update */
+    bool is_watching;          /* some have been equal to it for some updates */
+    holdfast_taxel_set alike;  /* these */
+    int32_t n_watched;         /* these updates */
+    int32_t n_alike;           /* those that changed it */
+    holdfast_taxel_set equals; /* taxels that break the law */
+    bool has_equals;           /* there are some */
+    holdfast_taxel_set fallen; /* taxels whose noise has gone */
+    bool has_fallen;           /* there are some */
+    int64_t n_settled;         /* updates since the last gap */
+    int64_t n_levelled;        /* updates since these taxels were looked for */
+    int64_t n_steady;          /* times that none had fallen */
+    /* Modules: */
+    hf_real total;     /* weighted sum of the readings, see hf_scan; NaN if they are not valid */
+    bool has_changed;  /* with the last sample */
+    int64_t n_copied;  /* changes while the finger was equal to another */
+    size_t copy_of;    /* index of that finger */
+    uint32_t faults;   /* of the finger as a whole at the last update */
+} holdfast_laws;
 
 /* A sample in the ring of relative features (motion.c). */
 typedef struct {
@@ -142,11 +176,6 @@ typedef struct {
     /* Implausible samples (implausible.c). */
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
-    uint64_t n_valid;          /* samples whose readings are all valid, or were replaced */
-    uint64_t ring_period;      /* of the ring of samples that is followed; 0 without one */
-    uint64_t ring_length;      /* successive samples with the sum of that a period before */
-    uint64_t ring_age;         /* samples since the ring is followed */
-    bool ring_varies;          /* enough readings and samples of the ring differ */
     holdfast_motion motion;
     /* Readings that never changed (faults.c): last, as a living finger does not read it. */
     int64_t n_constant;   /* samples before the first that changed a reading */
@@ -172,7 +201,7 @@ typedef struct {
     HF_ARRAY(holdfast_finger_memory, fingers, HOLDFAST_N_FINGERS);
     HF_ARRAY(holdfast_taxel, taxels, HOLDFAST_N_LANES);
     HF_ARRAY(holdfast_mask, masks, HOLDFAST_N_LANES);
-    HF_ARRAY(holdfast_ring, rings, HOLDFAST_N_LANES);
+    HF_ARRAY(holdfast_laws, laws, HOLDFAST_N_FINGERS);
     HF_ARRAY(hf_real, readings, 3 * HOLDFAST_N_LANES);  /* of this sample */
     HF_ARRAY(hf_real, previous, 3 * HOLDFAST_N_LANES);  /* of the last valid sample */
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
@@ -181,7 +210,8 @@ typedef struct {
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */
-    HF_ARRAY(hf_real, sums, HOLDFAST_N_FINGERS * HF_N_RING_SUMS); /* of samples, a ring */
+    HF_ARRAY(hf_real, levels, HOLDFAST_N_LANES);        /* least of the second differences of each
+                                                           taxel; 0 before */
     /* (n_fingers, n_history, 4) and (n_fingers, n_history, n_channels, n_levels, 3): rings. */
     HF_ARRAY(hf_real, history, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HF_N_COMPONENTS);
     HF_ARRAY(hf_real, blocks, HOLDFAST_N_FINGERS * HOLDFAST_N_HISTORY * HOLDFAST_N_CHANNELS *

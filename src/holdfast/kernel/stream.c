@@ -28,8 +28,8 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.powers = memory->powers + 2 * first;
     f.taxels = memory->taxels + first;
     f.masks = memory->masks + first;
-    f.rings = memory->rings + first;
-    f.sums = memory->sums + index * HF_N_RING_SUMS;
+    f.levels = memory->levels + first;
+    f.laws = &memory->laws[index];
     f.history = memory->history + index * HF_N_HISTORY(hand) * HF_N_COMPONENTS;
     f.blocks = memory->blocks + index * HF_N_HISTORY(hand) * n_blocks;
     f.track = memory->track + index * HF_N_TRACK(hand);
@@ -183,6 +183,9 @@ static int32_t hf_process(const hf_finger *f, double time)
     const hf_real low = f->finger->low, high = f->finger->high;
     /* Haar windows begin again after any gap, also after one that windows in seconds bridge. */
     const bool after_gap = (hf_real)(time - s->last_time) > HF_GAP_LIMIT_PERIODS * f->hand->period;
+    if ((hf_real)(time - s->last_time) > HF_PAUSE_SECONDS) {
+        hf_forget_returns(f);
+    }
     hf_clear_values(v);
     s->last_time = time;
     s->field_speed = 0; /* a sample that is refused shows none */
@@ -241,6 +244,10 @@ static int32_t hf_process(const hf_finger *f, double time)
     if (s->taxel_faults) {
         v->faults |= s->taxel_faults;
         hf_unite(f, &v->taxels, &s->faulty_taxels);
+    }
+    if (f->laws->has_equals) {
+        v->faults |= HOLDFAST_EQUAL_TAXELS;
+        hf_unite(f, &v->taxels, &f->laws->equals);
     }
     if (is_saturated) {
         const holdfast_taxel_set at_limit = hf_taxels_outside(f, low, high);
@@ -401,6 +408,7 @@ HF_API void holdfast_advance(
             hf_compute_own(&f, hand->features + i * width, memory->own + i * width);
         }
     }
+    hf_find_copies(hand, memory, present);
     if (hand->alike) {
         hf_compute_of_hand(hand, memory);
     }

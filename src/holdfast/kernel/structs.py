@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 C_TYPES: dict[str, npt.DTypeLike] = {
     "double": np.float64, "bool": np.bool_, "size_t": np.uintp, "int32_t": np.int32,
-    "uint32_t": np.uint32, "int64_t": np.int64, "uint64_t": np.uint64,
+    "uint16_t": np.uint16, "uint32_t": np.uint32, "int64_t": np.int64, "uint64_t": np.uint64,
 }  # fmt: skip
 Structs = npt.NDArray[np.void]
 

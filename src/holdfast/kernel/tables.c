@@ -168,7 +168,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->fingers = (holdfast_finger_memory *)hf_take(block, &used, fingers, sizeof *m->fingers);
     m->taxels = (holdfast_taxel *)hf_take(block, &used, lanes, sizeof *m->taxels);
     m->masks = (holdfast_mask *)hf_take(block, &used, lanes, sizeof *m->masks);
-    m->rings = (holdfast_ring *)hf_take(block, &used, lanes, sizeof *m->rings);
+    m->laws = (holdfast_laws *)hf_take(block, &used, fingers, sizeof *m->laws);
     m->readings = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->previous = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->baseline = (hf_real *)hf_take(block, &used, 3 * lanes, width);
@@ -176,7 +176,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
     m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
-    m->sums = (hf_real *)hf_take(block, &used, fingers * HF_N_RING_SUMS, width);
+    m->levels = (hf_real *)hf_take(block, &used, lanes, width);
     m->history = (hf_real *)hf_take(block, &used, rows * HF_N_COMPONENTS, width);
     m->blocks = (hf_real *)hf_take(
         block, &used, rows * hand->n_channels * hand->n_levels * HF_N_SUMS, width);
@@ -240,7 +240,7 @@ HF_SHARED void hf_begin_finger(const hf_finger *f)
     hf_clear_values(f->values);
     f->values->reason =
         f->hand->tare_kind == HOLDFAST_TARE_SECONDS ? HOLDFAST_TARE : HOLDFAST_WARM_UP;
-    hf_fill(f->sums, HF_N_RING_SUMS, HF_NAN);
+    memset(f->laws, 0, sizeof *f->laws);
     hf_fill(f->relative, HF_N_LAGS(f->hand) * HOLDFAST_N_RELATIVE, HF_NAN);
     hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_SECONDS, HF_NAN);
     for (size_t i = 0; i < f->n; ++i) {

@@ -91,7 +91,7 @@ FAULT_TEXTS: Mapping[Fault, FaultText] = {
         f"the grip; open the hand and {_NEW_TARE}",
     ),
     Fault.REPEATED: FaultText(
-        "repeated", "the same few samples come again and again: restart the device or its server"
+        "repeated", "earlier readings come again in their order: restart the device or its server"
     ),
     Fault.EQUAL_TAXELS: FaultText(
         "equal taxels",

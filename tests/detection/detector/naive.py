@@ -6,12 +6,15 @@ import numpy as np
 
 from detection import naive_features as naive
 
+from .naive_laws import Laws
+
 NAN = math.nan
 
 
 ORDER = (
     "not_finite", "stuck", "saturated", "tare_loaded", "dead", "noisy", "out_of_range",
-    "tare_drift", "offset", "repeated", "field", "invalid", "rezeroed",
+    "tare_drift", "offset", "repeated", "field", "invalid",
+    "equal_taxels", "copied", "rezeroed",
 )  # fmt: skip
 
 
@@ -182,7 +185,7 @@ class Finger:
         self.kind, self.seconds = tare.kind, tare.seconds
         self.longest = max([window, *(spec.window for spec in part.features)])
         self.samples = []  # every finite sample: (time, readings)
-        self.frames, self.rest_readings = [], None
+        self.laws, self.rest_readings = Laws(sensor.n_taxels, period), None
         self.jumped, self.pending, self.offsets, self.shown = set(), {}, {}, 0.0
         self.rezeroed, self.rezeroed_at = False, NAN
         self.axes, self.stuck_axes = {}, [set(), set(), set()]
@@ -292,6 +295,9 @@ class Finger:
         readings = np.zeros_like(given)
         readings[self.used] = given[self.used]
         fresh = self.last is not None and time - self.last > 3.0003 * self.period
+        if self.last is not None and time - self.last > 0.5:
+            self.laws.pauses.append(len(self.laws.lanes))
+            self.laws.n_left = 0
         self.last, self.field_speed = time, 0.0
         self.force, self.sigma = (NAN, NAN, NAN), NAN
         low, high = self.sensor.range or (-math.inf, math.inf)
@@ -331,6 +337,7 @@ class Finger:
                 return self.refuse(faults, invalid)
         invalid |= offsets
         self.watch_life(readings, time)
+        self.invalid = invalid
         if implausible := self.implausible(readings):
             return self.refuse(faults | implausible, invalid)
         self.n_refused = self.n_refused * (self.baseline is not None)
@@ -523,9 +530,9 @@ class Finger:
         """Faults of a finger whose readings are valid and cannot be true."""
         low, high = self.sensor.range or (-math.inf, math.inf)
         used, size, faults = readings[self.used], high - low, set()
-        self.frames = [*self.frames[-191:], used]
-        if any(self.is_ring(self.frames[-3 * p :], p) for p in range(3, 65)):
-            faults.add("repeated")
+        last = self.samples[-1][1] if self.samples else np.zeros_like(readings)
+        self.laws.update(readings, last, self.taxels, self.n_news)
+        faults |= self.laws.faults
         if math.isfinite(size):
             near = (used < low + 0.01 * size) | (used > high - 0.01 * size)
             if 2 * near.any(axis=1).sum() > len(used):
@@ -540,20 +547,6 @@ class Finger:
         if 0 < np.abs(used).max() < 1e-37:
             faults.add("out_of_range")
         return faults
-
-    @staticmethod
-    def is_ring(frames, p):
-        """Whether frames are three times the same p, of which three and 12 numbers differ.
-
-        Sums of whole counts are exact; those of different frames are rarely the same.
-        """
-        if len(frames) < 3 * p or (frames[-1] != frames[-1 - p]).any():
-            return False
-        sums = [tuple(frame.sum(axis=0)) for frame in frames]
-        same = sums[:-p] == sums[p:]
-        ring = np.array(frames[-p:])
-        n_varying = (ring != ring[0]).any(axis=0).sum()
-        return same and n_varying >= 12 and len({frame.tobytes() for frame in ring}) >= 3
 
     def lose(self, faults, taxels):
         """Leave out taxels for good that have no valid reading in the tare for half a second."""
@@ -662,7 +655,8 @@ class Finger:
         if self.sensor.magnetic and self.n_news % every == 0:
             axis = self.n_news // every % 3
             self.stuck_axes[axis] = self.compare_axis(axis, now, low, high)
-        stuck |= set().union(*self.stuck_axes)
+        self.laws.compare_levels(self.taxels, self.n_news, fresh, self.invalid)
+        stuck |= set().union(*self.stuck_axes, self.laws.fallen)
         noisy = self.noisy_taxels = self.noisy()
         named = {"dead": dead, "stuck": stuck, "noisy": noisy}
         self.wrong = {fault for fault, taxels in named.items() if taxels}
@@ -733,7 +727,9 @@ class Finger:
         at_limit = {i for i in self.used if ((readings[i] <= low) | (readings[i] >= high)).any()}
         if at_limit:
             faults.add("saturated")
-        return faults, taxels | at_limit
+        if self.laws.equals:
+            faults.add("equal_taxels")
+        return faults, taxels | at_limit | self.laws.equals
 
     def is_stuck(self):
         half_a_second = 0.5 / self.period
@@ -961,17 +957,34 @@ class Hand:
         }
         for finger in self.fingers.values():
             finger.others = [x for x in self.fingers.values() if x is not finger]
+        self.copies = [(0, 0)] * len(self.fingers)
 
     def update(self, samples, time):
         for name, finger in self.fingers.items():
             finger.wait(time)
             if name in samples:
                 finger.take(time, np.asarray(samples[name], dtype=np.float64))
+        self.find_copies([name in samples for name in self.fingers])
         for name, finger in self.fingers.items():
             if name in samples or finger.status == "gap":
                 finger.decide(time, self.fingers.values(), self.model.debounce)
         rows = {name: self.row(finger) for name, finger in self.fingers.items()}
         return time, self.state(), rows
+
+    def find_copies(self, present):
+        """Name two fingers that have been equal for 20 changes."""
+        fingers = list(self.fingers.values())
+        for i, finger in enumerate(fingers[1:], 1):
+            total = finger.laws.total
+            equal = [j for j in range(i) if present[j] and fingers[j].laws.total == total]
+            other = equal[0] if present[i] and equal else i
+            known = other < i and self.copies[i][0] == other
+            n = self.copies[i][1] + finger.laws.is_new if known else 0
+            self.copies[i] = other if present[i] else self.copies[i][0], n
+            finger.laws.is_new = False
+            for copy in (finger, fingers[other]) if n >= 20 else ():
+                copy.status, copy.stretch = "fault", []
+                copy.faults = tuple(x for x in ORDER if x in {*copy.faults, "copied"})
 
     @staticmethod
     def row(finger):

@@ -102,7 +102,7 @@ def test_a_finger_that_is_plugged_in_is_alive_at_once_and_takes_a_new_tare(value
 def test_a_coarse_sensor_that_rests_keeps_its_tare_in_a_touch():
     """Less noise than a step: two taxels of six change first, and feel the touch at once."""
     values = np.full((300, 6, 3), 200.0)
-    values[150:, :2, 0] += 100.0 + np.arange(150)[:, None] % 2
+    values[150:, :2, 0] += [100.0, 90.0] + np.arange(150)[:, None] % 2
     thumb = [estimate.fingers["thumb"] for estimate in estimates(thumb=values)]
     assert (thumb[149].faults, thumb[150].faults) == ((Fault.DEAD,), ())
     assert {finger.state for finger in thumb[150:]} == {STABLE}

@@ -126,7 +126,7 @@ class TestReasons:
         detector = Detector(model())
         values = lively()
         for k in range(50):
-            last = detector.update({"thumb": values[k], "index": values[k]}, k / RATE)
+            last = detector.update({"thumb": values[k], "index": values[k + 1]}, k / RATE)
         estimates = [detector.update({"thumb": values[k]}, k / RATE) for k in range(50, 60)]
         assert [e.fingers["index"] for e in estimates[:3]] == [last.fingers["index"]] * 3
         assert {e.fingers["index"].reason for e in estimates[3:]} == {Reason.GAP}

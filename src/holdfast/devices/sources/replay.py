@@ -24,6 +24,9 @@ SAMPLES_PER_CHUNK = 1024
 PAUSE = 1.0
 """Time between the last sample of a recording and the first of the next [s]; a detector
 recognizes it as a gap."""
+MIN_LOOP_SAMPLES = 512
+"""Samples of a recording that is repeated, from which on no detector takes it for repeated readings
+of a sensor, even if it loses the pause."""
 RESTART_WAIT = 2.0
 """Longest wait for the next recording when a client begins it [s]; clients wait 5 s for samples."""
 
@@ -118,6 +121,9 @@ class Player(Source):
         speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
         loop: play another recording at the end.
 
+    Attributes:
+        hint: what to know about a recording that is repeated; set by `open`.
+
     Raises:
         ValueError: the speed is negative or not finite.
     """
@@ -125,7 +131,7 @@ class Player(Source):
     def __init__(self, name: str, *, speed: float = 1.0, loop: bool = False) -> None:
         if not (math.isfinite(speed) and speed >= 0):
             raise ValueError(f"a speed of at least 0 expected, {speed} given")
-        self.name = name
+        self.name, self.hint = name, ""
         self.paced = speed > 0
         self.speed = speed
         self._loops = loop
@@ -163,6 +169,13 @@ class Player(Source):
             raise RecordingError(f"{self.name} has no samples; at least one expected")
         self.sensors = {name: module.sensor for name, module in first.modules.items()}
         self.metadata = self.metadata_of(first)
+        n_samples = max(module.n_samples for module in first.modules.values())
+        self.hint = ""
+        if self._loops and n_samples < MIN_LOOP_SAMPLES:
+            self.hint = (
+                f"{self.name} has {n_samples} samples, less than {MIN_LOOP_SAMPLES}: its end meets "
+                f"its begin after {PAUSE:g} s; without that pause it is `repeated`"
+            )
         if not first.complete:
             self._notices.append(f"{self.name} was cut off; what could be recovered is played")
         self._content = timed_samples(chain([first], chunks))
