@@ -91,18 +91,18 @@ def sensors(
 
 
 def print_all(*, as_json: bool) -> None:
-    """Print the name, taxels, unit and rate of all sensors, and all hands."""
+    """Print the name, taxels, unit, rate and maker of all sensors, and all hands."""
     from holdfast import sensors as known
 
-    skins = [known.sensor(name) for name in known.built_in_sensors()]
+    skins = [(m, known.sensor(n)) for m, names in known.sensors_by_maker().items() for n in names]
     hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
-        facts = [{field: getattr(skin, field) for field in fields} for skin in skins]
+        facts = [{"maker": m} | {name: getattr(skin, name) for name in fields} for m, skin in skins]
         print_json({"sensors": facts, "hands": [hand.to_dict() for hand in hands]})
         return
-    rows = [(skin.name, skin.n_taxels, skin.unit, f"{skin.rate:g} Hz") for skin in skins]
-    print_table(("sensor", "taxels", "unit", "rate"), rows)
+    rows = [(skin.name, skin.n_taxels, skin.unit, f"{skin.rate:g} Hz", m) for m, skin in skins]
+    print_table(("sensor", "taxels", "unit", "rate", "maker"), rows)
     print_line()
     counts = [(hand.name, hand.n_taxels, len(hand.modules)) for hand in hands]
     print_table(("hand", "taxels", "modules"), counts)

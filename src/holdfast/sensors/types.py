@@ -28,7 +28,7 @@ MAGNETIC_SENSORS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin")
 
 The sections of `gtac` lie on different fingers, and half of what they read is no field."""
 
-RESTING_SENSORS = ("gtac",)
+RESTING_SENSORS = ("gtac", "paxini-120", "xhand")
 """Built-in sensors that rest at exact zero. Files do not repeat it for them."""
 
 ROTATION_TOLERANCE = 1e-5
