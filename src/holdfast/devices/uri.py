@@ -22,9 +22,10 @@ SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
     "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
     "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
+    "orca": "an ORCA Touch hand: orca:///dev/ttyUSB0?baud=921600",
 }
 """URI schemes of the sources, with a description and an example of each."""
-DEVICE_SCHEMES = ("xela", "serial")
+DEVICE_SCHEMES = ("xela", "serial", "orca")
 """Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
 that makes a source."""
 VALUES = ("counts", "calibrated")
