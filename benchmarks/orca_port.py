@@ -18,7 +18,7 @@ from contextlib import suppress
 import numpy as np
 
 from holdfast.devices.sources import open_source
-from holdfast.devices.sources.orca.frames import OrcaHand
+from holdfast.devices.sources.orca_frames import OrcaHand
 
 FINGERS = {"thumb": 51, "index": 87, "middle": 87, "ring": 87, "pinky": 51}
 RATE = 1000.0

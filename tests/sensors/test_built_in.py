@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from holdfast.sensors import built_in_hands, built_in_sensors, hand, sensor, sensors_by_maker
+from holdfast.sensors import built_in_hands, built_in_sensors, hand, sensor
+from holdfast.sensors.built_in import SENSORS_BY_MAKER
 
 N_TAXELS = {
     "uskin-curved": 30,
@@ -30,7 +31,7 @@ def nearest(positions):
 
 def test_built_in_sensors():
     assert {name: sensor(name).n_taxels for name in built_in_sensors()} == N_TAXELS
-    assert [name for names in sensors_by_maker().values() for name in names] == list(N_TAXELS)
+    assert [name for own in SENSORS_BY_MAKER.values() for name in own] == list(N_TAXELS)
 
 
 @pytest.mark.parametrize("name", N_TAXELS)

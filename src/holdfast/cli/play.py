@@ -105,7 +105,7 @@ def play(
                 sys.stdout.flush()  # a program that reads the pipe waits for the address
             print_message(f"{server.uri} sends {source} as {what}; Ctrl-C stops it")
             show_clients(server)
-    if server.failure is not None:
+    if isinstance(server, XelaServer) and server.failure is not None:
         raise server.failure
     if as_json:
         print_json({"packets": server.n_packets})

@@ -93,15 +93,16 @@ def sensors(
 def print_all(*, as_json: bool) -> None:
     """Print the name, taxels, unit, rate and maker of all sensors, and all hands."""
     from holdfast import sensors as known
+    from holdfast.sensors.built_in import SENSORS_BY_MAKER
 
-    skins = [(m, known.sensor(n)) for m, names in known.sensors_by_maker().items() for n in names]
+    skins = [(make(), maker) for maker, own in SENSORS_BY_MAKER.items() for make in own.values()]
     hands = [known.hand(name) for name in known.built_in_hands()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
-        facts = [{"maker": m} | {name: getattr(skin, name) for name in fields} for m, skin in skins]
+        facts = [{n: getattr(one, n) for n in fields} | {"maker": maker} for one, maker in skins]
         print_json({"sensors": facts, "hands": [hand.to_dict() for hand in hands]})
         return
-    rows = [(skin.name, skin.n_taxels, skin.unit, f"{skin.rate:g} Hz", m) for m, skin in skins]
+    rows = [(x.name, x.n_taxels, x.unit, f"{x.rate:g} Hz", maker) for x, maker in skins]
     print_table(("sensor", "taxels", "unit", "rate", "maker"), rows)
     print_line()
     counts = [(hand.name, hand.n_taxels, len(hand.modules)) for hand in hands]

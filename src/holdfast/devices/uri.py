@@ -13,7 +13,8 @@ from urllib.parse import parse_qsl, urlsplit
 from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
-from holdfast.sensors import Sensor, built_in_sensors, sensor
+from holdfast.sensors import Sensor
+from holdfast.sensors.files import find_sensor
 
 if TYPE_CHECKING:
     from holdfast.devices.sources.base import Source
@@ -91,6 +92,18 @@ class Address:
             )
         return values == "calibrated"
 
+    def integer(self, name: str, default: int, least: int = 0) -> int:
+        """Return a parameter that is a whole number.
+
+        Raises:
+            ValueError: it is not, or is below `least`.
+        """
+        text = self.parameters.get(name, str(default))
+        if not (text.isascii() and text.isdecimal() and int(text) >= least):
+            expected = f"{name}={default}, a whole number of at least {least}"
+            raise ValueError(f"{self.text}: {expected}, expected, {text!r} given")
+        return int(text)
+
     def sensor(self) -> Sensor | None:
         """Return the sensor of `sensor=FILE.json` or `sensor=NAME`; None without the parameter.
 
@@ -100,14 +113,8 @@ class Address:
         given = self.parameters.get("sensor")
         if given is None:
             return None
-        # The names are checked here, so that the message has the URI and all of them.
-        if not given.endswith(".json") and given not in (names := built_in_sensors()):
-            raise ValueError(
-                f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
-                f"expected, {given!r} given"
-            )
         try:
-            return Sensor.from_json(given) if given.endswith(".json") else sensor(given)
+            return find_sensor(given)
         except OSError as cause:
             raise ValueError(f"{self.text}: cannot read {given}: {cause.strerror}") from cause
         except ValueError as cause:

@@ -7,7 +7,6 @@ from holdfast.sensors.built_in import (
     flat_sensor,
     hand,
     sensor,
-    sensors_by_maker,
 )
 from holdfast.sensors.taxel_numbers import taxel_index, taxel_number, taxel_numbers
 from holdfast.sensors.types import Hand, HandModule, Sensor
@@ -22,7 +21,6 @@ __all__ = [
     "flat_sensor",
     "hand",
     "sensor",
-    "sensors_by_maker",
     "taxel_index",
     "taxel_number",
     "taxel_numbers",

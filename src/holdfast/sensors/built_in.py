@@ -60,11 +60,6 @@ def built_in_sensors() -> tuple[str, ...]:
     return tuple(SENSORS)
 
 
-def sensors_by_maker() -> dict[str, tuple[str, ...]]:
-    """Return the names of the built-in sensors, by maker."""
-    return {maker: tuple(sensors) for maker, sensors in SENSORS_BY_MAKER.items()}
-
-
 def built_in_hands() -> tuple[str, ...]:
     """Return the names of the built-in hands."""
     return tuple(HANDS)

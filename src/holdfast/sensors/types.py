@@ -114,10 +114,8 @@ class Sensor:
             object.__setattr__(self, "range", (low, high))
         self._check_step()
         rotations = _exact_rotations(rotations, self.name)
-        length = float(np.linalg.norm(normal)) if longest < 1e100 else np.inf
-        if not 1e-100 < length < np.inf:  # the squares in the norm overflow, or all become zero
-            normal = normal / longest
-            length = float(np.linalg.norm(normal))
+        normal = normal / longest  # the squares in the norm may overflow, or all become zero
+        length = float(np.linalg.norm(normal))
         # Values hold read-only arrays: a sensor is shared by models, recordings and streams.
         for name, values in (
             ("positions", positions), ("rotations", rotations), ("normal", normal / length)
@@ -221,18 +219,7 @@ class Sensor:
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
             raise ValueError(f"fields {missing} are missing in a sensor; it needs {sorted(needed)}")
-        return cls(
-            name=str(data["name"]),
-            positions=data["positions"],
-            rotations=data["rotations"],
-            normal=data["normal"],
-            rate=float(data["rate"]),
-            unit=data.get("unit", "count"),
-            range=data.get("range"),
-            magnetic=data.get("magnetic"),
-            step=data.get("step"),
-            rests_at_zero=data.get("rests_at_zero"),
-        )
+        return cls(**{**data, "name": str(data["name"]), "rate": float(data["rate"])})
 
     @classmethod
     def from_json(cls, path: str | Path) -> Self:

@@ -62,7 +62,7 @@ class PortSource(DeviceSource):
         if not self._path:
             scheme = address.text.partition(":")[0]
             raise ValueError(f"{address.text}: a port expected, as in {scheme}:///dev/ttyACM0")
-        self.baud = _positive(address, "baud", baud)
+        self.baud = address.integer("baud", baud, 1)
         self._period = period
         self.assembler = Assembler()
         self._port: Serial | None = None
@@ -177,7 +177,7 @@ class SerialSource(PortSource):
         address.only("sensor", "fingers", "baud", "mags")
         self._sensor = address.sensor() or sensor("anyskin")
         super().__init__(address, DEFAULT_BAUD, 1 / self._sensor.rate)
-        self._n_mags = _positive(address, "mags", self._sensor.n_taxels)
+        self._n_mags = address.integer("mags", self._sensor.n_taxels, 1)
         modules = dict.fromkeys(_modules(address, self._n_mags, self._sensor), self._sensor)
         self._devices = {BOARD: Device(BOARD, self._sensor.name, modules)}
         self._decoder = AnySkinDecoder(self._n_mags)
@@ -226,13 +226,6 @@ def source(address: Address) -> Source:
 def state() -> str:
     """Return the serial ports of this machine."""
     return ", ".join(port.device for port in comports()) or "no serial port"
-
-
-def _positive(address: Address, name: str, default: int) -> int:
-    text = address.parameters.get(name, str(default))
-    if not (text.isascii() and text.isdecimal() and int(text)):
-        raise ValueError(f"{address.text}: {name}={default}, at least 1, expected, {text!r} given")
-    return int(text)
 
 
 def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:

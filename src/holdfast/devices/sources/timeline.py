@@ -21,8 +21,8 @@ MAX_CLOCK_DRIFT = 1e-4
 """Largest drift between two clocks [s/s]."""
 CLOCK_GAIN = 0.1
 """Share of the delay of its arrival by which a sample is later than its period says."""
-FIRST_COUNTING_TIME, COUNTING_TIME = 0.25, 0.5
-"""Time over which samples are counted to measure their period: at first, and then [s]."""
+COUNTING_TIME = 0.3
+"""Time over which samples are counted to measure their period [s]."""
 MAX_COUNTED_PAUSE = 0.2
 """After a longer pause, counting begins again [s]."""
 MAX_TIME = 1e11
@@ -162,14 +162,12 @@ class ArrivalClock:
         return [end - (n - 1 - k) * step for k in range(n)]
 
     def _measure(self, n: int, received: float) -> None:
-        if received - self._received > MAX_COUNTED_PAUSE:
+        self._n += n
+        passed, pause = received - self._since, received - self._received
+        if pause <= MAX_COUNTED_PAUSE and passed >= COUNTING_TIME:
+            self._period = passed / self._n
+        if pause > MAX_COUNTED_PAUSE or passed >= COUNTING_TIME:
             self._since, self._n = received, 0
-        else:
-            self._n += n
-            long_enough = COUNTING_TIME if self._period else FIRST_COUNTING_TIME
-            if received - self._since >= long_enough:
-                self._period = (received - self._since) / self._n
-                self._since, self._n = received, 0
         self._received = received
 
 

@@ -2,14 +2,15 @@
 
 import os
 import select
+import time
 from collections.abc import Sequence
-from threading import Event, Thread
+from contextlib import suppress
 from typing import Self
 
 import numpy as np
 
 from holdfast.devices.sources import Source
-from holdfast.devices.sources.orca.frames import FINGER_PLACES, OrcaHand
+from holdfast.devices.sources.orca_frames import FINGER_PLACES, OrcaHand
 from holdfast.devices.sources.xela.encoder import SampleBatcher
 from holdfast.errors import SourceError
 
@@ -20,10 +21,9 @@ MAX_REQUESTS = 4096
 
 
 class OrcaPort:
-    """ORCA Touch hand at a pseudo-terminal that sends the samples of a source, in a thread.
+    """ORCA Touch hand at a pseudo-terminal that sends the samples of a source, during `wait`.
 
-    The source is read while a host has the stream requested and the port open. A frame has the
-    newest readings of all fingers.
+    The source is read while a host has the port open and the stream requested.
 
     Args:
         source: an open source; the caller closes it.
@@ -31,9 +31,10 @@ class OrcaPort:
 
     Attributes:
         port: path of the port.
+        uri: URI for `open_source`.
         modules: name of each finger, by the number of its slot from 1.
+        n_clients: number of hosts that get frames, 0 or 1.
         n_packets: number of frames sent.
-        failure: the exception that ended it; None if there was none.
 
     Raises:
         ValueError: the hand cannot have the modules of the source.
@@ -53,80 +54,47 @@ class OrcaPort:
         self._at_rest = {name: np.zeros((n, 3)) for name, n in self._hand.fingers.items()}
         self._batcher = SampleBatcher(source.sensors, own_stamps=False)
         self.modules: dict[int, Sequence[str]] = {
-            list(FINGER_PLACES).index(name) + 1: (name,) for name in self._hand.fingers
+            slot: (name,) for slot, name in enumerate(FINGER_PLACES, 1) if name in self._at_rest
         }
         self._source, self._restarts = source, restart
-        self._was_streaming = False
-        self.n_packets = 0
-        self.failure: Exception | None = None
-        self._stopping, self._ended = Event(), Event()
-        self._thread = Thread(target=self._run, name="holdfast-orca", daemon=True)
-
-    @property
-    def n_clients(self) -> int:
-        """Number of hosts that get frames, 0 or 1."""
-        return int(self._hand.is_streaming)
-
-    @property
-    def uri(self) -> str:
-        """URI for `open_source`."""
-        return f"orca://{self.port}"
-
-    def wait(self, timeout: float) -> bool:
-        """Wait at most `timeout` [s] for the end. Return whether it has ended."""
-        return self._ended.wait(timeout)
+        self.n_clients = self.n_packets = 0
 
     def __enter__(self) -> Self:
         self._line, host = os.openpty()
         self.port = os.ttyname(host)
+        self.uri = f"orca://{self.port}"
         # Closed here: then reading fails while no host has the port open.
         os.close(host)
-        os.set_blocking(self._line, False)
-        self._thread.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stopping.set()
-        self._thread.join()
         os.close(self._line)
 
-    def _run(self) -> None:
-        try:
-            while not self._stopping.is_set() and not self._source.ended:
-                self._serve()
-                if not self._hand.is_streaming:
-                    self._stopping.wait(POLL_INTERVAL)
-                    continue
-                arrival = self._source.read(POLL_INTERVAL)
-                if arrival is not None and arrival.samples:
-                    for batch in self._batcher.add(arrival.samples, arrival.time):
-                        self._send(self._hand.frame({**self._at_rest, **batch.samples}))
-                        self.n_packets += 1
-        except Exception as failure:  # the caller reads it
-            self.failure = failure
-        finally:
-            self._ended.set()
+    def wait(self, timeout: float) -> bool:
+        """Serve the host for `timeout` [s]. Return whether the source has ended."""
+        end = time.monotonic() + timeout
+        while time.monotonic() < end and not self._source.ended:
+            self._serve()
+            if not self._hand.is_streaming:
+                time.sleep(POLL_INTERVAL)
+            elif (arrival := self._source.read(POLL_INTERVAL)) is not None and arrival.samples:
+                for batch in self._batcher.add(arrival.samples, arrival.time):
+                    self._send(self._hand.frame({**self._at_rest, **batch.samples}))
+                    self.n_packets += 1
+        return self._source.ended
 
     def _serve(self) -> None:
         """Answer the requests of the host."""
-        try:
-            requests = os.read(self._line, MAX_REQUESTS)
-        except BlockingIOError:
-            return
-        except OSError:  # no host has the port open
-            self._hand.is_streaming = False
-        else:
-            self._send(self._hand.feed(requests))
-        if self._hand.is_streaming and not self._was_streaming and self._restarts:
+        if select.select([self._line], [], [], 0.0)[0]:
+            try:
+                self._send(self._hand.feed(os.read(self._line, MAX_REQUESTS)))
+            except OSError:  # no host has the port open
+                self._hand.is_streaming = False
+        if self._hand.is_streaming > self.n_clients and self._restarts:
             self._source.restart()
-        self._was_streaming = self._hand.is_streaming
+        self.n_clients = int(self._hand.is_streaming)
 
     def _send(self, data: bytes) -> None:
-        """Send all bytes, unless the host closes the port; a slow host delays the source."""
-        while data and not self._stopping.is_set():
-            try:
-                data = data[os.write(self._line, data) :]
-            except BlockingIOError:
-                select.select([], [self._line], [], POLL_INTERVAL)
-            except OSError:
-                return
+        """Send bytes; a slow host delays the source, and one that closes the port gets none."""
+        with suppress(OSError):
+            os.write(self._line, data)

@@ -8,7 +8,7 @@ from devices.sources.board import Board
 from devices.sources.orca.hand import FINGERS, Hand, some_frames
 from devices.sources.reading import some_of, until
 from holdfast.devices.sources import open_source
-from holdfast.devices.sources.orca import frames as protocol
+from holdfast.devices.sources import orca_frames as protocol
 from holdfast.errors import SourceError
 
 pytestmark = pytest.mark.slow
@@ -56,22 +56,30 @@ def test_a_hand_with_other_fingertips_has_flat_grids():
     assert (one.name, one.unit, one.step, np.ptp(one.positions[:, 2])) == ("orca-60", "N", 0.1, 0)
 
 
-def test_a_hand_that_resets_is_armed_again(monkeypatch):
-    """Without two fingers, whose readings then are missing; the others go on."""
+@pytest.mark.parametrize("fingers", [FINGERS, FEWER])
+def test_a_hand_that_resets_is_armed_again(monkeypatch, fingers):
+    """Without two fingers, its frames are refused until the source is opened again."""
     monkeypatch.setattr(protocol, "REARM_SILENCE", 0.3)
     monkeypatch.setattr(protocol, "REARM_INTERVAL", 0.5)
     hand = Hand(FRAMES * 10)
     try:
         with made(hand) as source:
             some_of(source, 20)
-            hand.streams, hand.fingers = False, FEWER
-            hand.frames = iter(some_frames(400, FEWER)[0])
-            again = until(source, lambda arrival: set(arrival.samples) == set(FEWER))
-            assert set(source.sensors) == set(FINGERS)
-            assert again[-1].samples["ring"].shape == (87, 3)
+            hand.streams, hand.fingers = False, fingers
+            hand.frames = iter(some_frames(400, fingers)[0])
+            end, arrivals = time.monotonic() + 5, []
+            while hand.n_armed < 2 and time.monotonic() < end:
+                arrivals.append(source.read(0.02))
+            arrivals += until(source, lambda arrival: arrival.samples or arrival.faults)
     finally:
         hand.close()
     assert hand.n_armed == 2
+    if fingers == FINGERS:
+        assert set(arrivals[-1].samples) == set(FINGERS)
+    else:
+        assert set(arrivals[-1].faults) == set(FINGERS)
+        notices = [text for arrival in arrivals if arrival for text in arrival.notices]
+        assert any("(thumb, middle, ring): open the source again" in text for text in notices)
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,11 @@
-"""Connection to an ORCA Touch hand at a serial port."""
+"""Source of an ORCA Touch hand at a serial port."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from holdfast.devices.sources.assembler import Device
-from holdfast.devices.sources.orca.frames import OrcaClient
+from holdfast.devices.sources.base import Source
+from holdfast.devices.sources.orca_frames import OrcaClient
 from holdfast.devices.sources.serial import BOARD, SERIAL_OPEN_TIMEOUT, PortSource
 from holdfast.devices.uri import Address
 from holdfast.sensors import Sensor, sensor
@@ -21,9 +20,6 @@ SHARED_BAUD = 2_000_000
 class OrcaSource(PortSource):
     """Source of the fingers of an ORCA Touch hand.
 
-    A hand that was reset is asked again which fingers it has. Fingers that were not there when
-    the source was opened, or that have another number of taxels, are left out.
-
     Args:
         address: `orca:///dev/ttyUSB0?baud=921600`.
 
@@ -37,31 +33,35 @@ class OrcaSource(PortSource):
     def __init__(self, address: Address) -> None:
         address.only("baud")
         super().__init__(address, ORCA_BAUD, None)
-        self._client = OrcaClient()
+        self.begin()
 
     def begin(self) -> None:
-        """Ask which fingers there are, after the port was opened."""
-        self._client.reset()
-        self._fingers: dict[str, int] = {}
+        """Begin with the questions, after the port was opened."""
+        self._client = OrcaClient()
 
     def request(self, now: float) -> bytes:
-        """Return the request to send now."""
+        """Return the question to send now."""
         return self._client.request(now)
 
     def decode(self, data: bytes, received: float) -> Sequence[Array]:
         """Return the samples in the next bytes."""
-        frames = self._client.feed(data, received)
-        self.assembler.n_lost += frames.n_lost
-        self.assembler.n_refused += frames.n_damaged
-        if frames.n_damaged:
+        samples, n_damaged, n_lost = self._client.feed(data, received)
+        fingers = self._client.fingers
+        self.assembler.n_lost += n_lost
+        self.assembler.n_refused += n_damaged
+        if n_damaged:
             self.assembler.notify("frame", "damaged frames are dropped", received)
-        if self._client.fingers != self._fingers:
-            self._fingers = self._client.fingers
-            self.assembler.devices = {BOARD: self._device()}
-        elif self._client.n_responses > 1 and not self._fingers:
+        if fingers and not self.assembler.devices:
+            self._opened = fingers
+            modules = {name: fingertip(name, n_taxels) for name, n_taxels in fingers.items()}
+            self.assembler.devices = {BOARD: Device(BOARD, "ORCA Touch", modules)}
+        elif samples and fingers != self._opened:
+            text = f"the hand has other fingers now ({', '.join(fingers)}): open the source again"
+            self.assembler.report_taxel_count(BOARD, text, received)
+            return ()
+        elif self._client.n_responses > 1 and not fingers:
             self.problem = "the hand has no finger with a sensor: are they plugged in?"
-        device = self.assembler.devices.get(BOARD)
-        return frames.samples if device and device.modules else ()
+        return samples
 
     def explain_silence(self) -> str:
         """Return why there was no sample."""
@@ -73,18 +73,6 @@ class OrcaSource(PortSource):
             f"(?baud={SHARED_BAUD} where joint encoders share the port)"
         )
 
-    def _device(self) -> Device:
-        modules: dict[str, Sensor] = {}
-        order: list[int] = []
-        start = 0
-        for name, n_taxels in self._fingers.items():
-            one = fingertip(name, n_taxels)
-            if not self.sensors or self.sensors.get(name) == one:
-                modules[name] = one
-                order += range(start, start + n_taxels)
-            start += n_taxels
-        return Device(BOARD, "ORCA Touch", modules, np.array(order) if len(order) < start else None)
-
 
 def fingertip(finger: str, n_taxels: int) -> Sensor:
     """Return the sensor of a finger; one with another number of taxels is a flat grid.
@@ -93,10 +81,19 @@ def fingertip(finger: str, n_taxels: int) -> Sensor:
         >>> [fingertip("index", 87).name, fingertip("thumb", 51).name, fingertip("index", 60).name]
         ['orca-finger', 'orca-thumb', 'orca-60']
     """
-    small = "orca-pinky" if finger == "pinky" else "orca-thumb"
-    for known in (sensor("orca-finger"), sensor(small)):
-        if known.n_taxels == n_taxels:
-            return known
-    name = f"orca-{n_taxels}"
-    grid = flat_grid(name, n_taxels)
-    return replace(known, name=name, positions=grid.positions, rotations=grid.rotations)
+    large, small = (
+        sensor("orca-finger"),
+        sensor(f"orca-{'pinky' if finger == 'pinky' else 'thumb'}"),
+    )
+    grid = flat_grid(f"orca-{n_taxels}", n_taxels)
+    other = replace(large, name=grid.name, positions=grid.positions, rotations=grid.rotations)
+    return next((one for one in (large, small) if one.n_taxels == n_taxels), other)
+
+
+def source(address: Address) -> Source:
+    """Return the source of a URI; entering it opens the port.
+
+    Raises:
+        ValueError: a parameter is not valid.
+    """
+    return OrcaSource(address)
