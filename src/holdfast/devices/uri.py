@@ -85,12 +85,19 @@ class Address:
         Raises:
             ValueError: `values` is neither.
         """
-        values = self.parameters.get("values", VALUES[0])
-        if values not in VALUES:
-            raise ValueError(
-                f"{self.text}: values={' or '.join(VALUES)} expected, {values!r} given"
-            )
-        return values == "calibrated"
+        return self.choice("values", *VALUES) == "calibrated"
+
+    def choice(self, name: str, *choices: str) -> str:
+        """Return a parameter that has one of some values, by default the first.
+
+        Raises:
+            ValueError: it has another.
+        """
+        value = self.parameters.get(name, choices[0])
+        if value not in choices:
+            expected = " or ".join(choices)
+            raise ValueError(f"{self.text}: {name}={expected} expected, {value!r} given")
+        return value
 
     def integer(self, name: str, default: int, least: int = 0) -> int:
         """Return a parameter that is a whole number.

@@ -205,10 +205,8 @@ SENSORS_BY_MAKER: dict[str, dict[str, Callable[[], Sensor]]] = {
     },
     "ORCA": {name: partial(_orca, name) for name in ("orca-finger", "orca-thumb", "orca-pinky")},
     # 10 lines of 12 points towards the tip; nominal pitch.
-    "PaXini": {
-        "paxini-120": partial(_grid, "paxini-120", (10, 12), (2e-3, 2e-3), 60.0, INT8_UINT8)
-    },
-    "Robotera": {"xhand": partial(_grid, "xhand", (10, 12), (2e-3, 2e-3), 60.0)},
+    "PaXini": {"paxini-120": partial(_grid, "paxini-120", (10, 12), (2e-3,) * 2, 60.0, INT8_UINT8)},
+    "Robotera": {"xhand": partial(_grid, "xhand", (10, 12), (2e-3,) * 2, 60.0)},
 }
 """Functions that make the built-in sensors, by maker and name."""
 SENSORS = {name: make for own in SENSORS_BY_MAKER.values() for name, make in own.items()}

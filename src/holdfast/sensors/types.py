@@ -31,6 +31,9 @@ The sections of `gtac` lie on different fingers, and half of what they read is n
 RESTING_SENSORS = ("gtac", "paxini-120", "xhand")
 """Built-in sensors that rest at exact zero. Files do not repeat it for them."""
 
+SAID_BY_NAME = {"magnetic": MAGNETIC_SENSORS, "rests_at_zero": RESTING_SENSORS}
+"""Fields of a sensor that follow from its name, where they are None."""
+
 ROTATION_TOLERANCE = 1e-5
 """Maximum error of a rotation matrix as read; tables are rounded to six digits."""
 
@@ -100,10 +103,12 @@ class Sensor:
             )
         if self.unit not in ("count", "N"):
             raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
-        magnetic = self.name in MAGNETIC_SENSORS if self.magnetic is None else self.magnetic
-        if not isinstance(magnetic, bool):
-            raise ValueError(f"{self.name}: magnetic true or false expected, {magnetic!r} given")
-        object.__setattr__(self, "magnetic", magnetic)
+        for field, names in SAID_BY_NAME.items():
+            flag = getattr(self, field)
+            flag = self.name in names if flag is None else flag
+            if not isinstance(flag, bool):
+                raise ValueError(f"{self.name}: {field} true or false expected, {flag!r} given")
+            object.__setattr__(self, field, flag)
         if self.range is not None:
             ends = _array(self.range, f"range of {self.name}", (2,))
             low, high = ends.tolist()
@@ -135,12 +140,6 @@ class Sensor:
                     f"{self.step:g} given"
                 )
             object.__setattr__(self, "step", float(self.step))
-        if self.rests_at_zero is None:
-            object.__setattr__(self, "rests_at_zero", self.name in RESTING_SENSORS)
-        if not isinstance(self.rests_at_zero, bool):
-            raise ValueError(
-                f"{self.name}: rests_at_zero true or false expected, {self.rests_at_zero!r} given"
-            )
         if self.rests_at_zero and not low <= 0 <= high:
             raise ValueError(
                 f"{self.name}: a sensor that rests at zero has zero in its range, "
@@ -195,12 +194,10 @@ class Sensor:
             "range": None if self.range is None else list(self.range),
         }
         # Only what the name does not say: files of built-in sensors are as before version 0.4.
-        if self.magnetic != (self.name in MAGNETIC_SENSORS):
-            fields["magnetic"] = self.magnetic
-        if self.step is not None:
-            fields["step"] = self.step
-        if self.rests_at_zero != (self.name in RESTING_SENSORS):
-            fields["rests_at_zero"] = self.rests_at_zero
+        for field in ("magnetic", "step", "rests_at_zero"):
+            value = getattr(self, field)
+            if value not in (None, self.name in SAID_BY_NAME.get(field, ())):
+                fields[field] = value
         return fields
 
     @classmethod

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from holdfast.devices.sources.assembler import Device
-from holdfast.devices.sources.base import Source
 from holdfast.devices.sources.orca_frames import OrcaClient
 from holdfast.devices.sources.serial import BOARD, SERIAL_OPEN_TIMEOUT, PortSource
 from holdfast.devices.uri import Address
@@ -90,10 +89,5 @@ def fingertip(finger: str, n_taxels: int) -> Sensor:
     return next((one for one in (large, small) if one.n_taxels == n_taxels), other)
 
 
-def source(address: Address) -> Source:
-    """Return the source of a URI; entering it opens the port.
-
-    Raises:
-        ValueError: a parameter is not valid.
-    """
-    return OrcaSource(address)
+source = OrcaSource
+"""Makes the source of a URI."""

@@ -97,10 +97,8 @@ class PortSource(DeviceSource):
             self._connect()
             deadline = time.monotonic() + SERIAL_OPEN_TIMEOUT
             while not self._read_port(max(deadline - time.monotonic(), 0.0)):
-                if self.problem:
-                    raise SourceError(f"{self.name}: {self.problem}")
-                if time.monotonic() >= deadline:
-                    raise SourceError(f"{self.name}: {self.explain_silence()}")
+                if self.problem or time.monotonic() >= deadline:
+                    raise SourceError(f"{self.name}: {self.problem or self.explain_silence()}")
         except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
             ports = ", ".join(sorted(port.device for port in comports())) or "none"
             raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause

@@ -213,7 +213,7 @@ def grasp_of(address: Address) -> Grasp:
         address.integer("repeat", 1),
         given.get("profile", "reference"),
         address.integer("seed", 0),
-        server=_boolean(address, "server"),
+        server=address.choice("server", "false", "true") == "true",
         sensor=given.get("sensor", USKIN),
     )
     try:
@@ -243,10 +243,3 @@ def write(grasp: str, path: str) -> None:
     fields = json.loads(grasp)
     fields["faults"] = MagneticFaults(**fields["faults"])  # the one field that is no plain value
     save_recording(simulated(Grasp(**fields)), path)
-
-
-def _boolean(address: Address, name: str) -> bool:
-    text = address.parameters.get(name, "false")
-    if text not in ("true", "false"):
-        raise ValueError(f"{address.text}: {name}=true or false expected, {text!r} given")
-    return text == "true"
