@@ -92,11 +92,10 @@ def sensors(
 
 def print_all(*, as_json: bool) -> None:
     """Print the name, taxels, unit, rate and maker of all sensors, and all hands."""
-    from holdfast import sensors as known
-    from holdfast.sensors.built_in import SENSORS_BY_MAKER
+    from holdfast.sensors.built_in import HANDS, SENSORS_BY_MAKER
 
     skins = [(make(), maker) for maker, own in SENSORS_BY_MAKER.items() for make in own.values()]
-    hands = [known.hand(name) for name in known.built_in_hands()]
+    hands = [make() for make in HANDS.values()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
         facts = [{n: getattr(one, n) for n in fields} | {"maker": maker} for one, maker in skins]
