@@ -114,8 +114,8 @@ def test_add_a_sensor(copy_of):
     copy = copy_of("Add a sensor")
     copy.change(
         "holdfast/sensors/built_in.py",
-        ('    "anyskin": anyskin,\n', '    "anyskin": anyskin,\n    "pad": _pad,\n'),
-        ("SENSORS = {", PAD + "SENSORS = {"),
+        ("SENSORS_BY_MAKER: ", PAD + "SENSORS_BY_MAKER: "),
+        ('    "AnySkin":', '    "Pads": {"pad": _pad},\n    "AnySkin":'),
     )  # fmt: skip
     shown = json.loads(copy.run(*VERB, "sensors", "pad", "--json"))
     assert "pad" in json.dumps(shown)

@@ -156,3 +156,51 @@ def test_readings_that_are_not_counts(capsys, tmp_path):
 )
 def test_what_a_command_waits_for(source, text):
     assert awaited(source) == text
+
+
+def orca_recording(path, n=300):
+    """Three fingers of an ORCA hand at 100 Hz, pressed harder and harder."""
+    times = np.arange(n) / 100
+    modules = {
+        name: Tactile(skin, times, 0.1 * np.arange(n)[:, None, None] * np.ones((skin.n_taxels, 3)))
+        for name, skin in (
+            ("thumb", sensor("orca-thumb")),
+            ("middle", sensor("orca-finger")),
+            ("pinky", sensor("orca-pinky")),
+        )
+    }
+    save_recording(Recording("hand", modules), path)
+    return path
+
+
+def test_it_acts_as_an_orca_hand(tmp_path):
+    """Each program that opens the port gets the recording from its beginning."""
+    program = "import sys; from holdfast.cli import main; sys.exit(main())"
+    path = orca_recording(tmp_path / "hand.parquet")
+    words = ["play", str(path), "--orca", "--json"]
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, *words], stdout=subprocess.PIPE, text=True
+    )
+    with process:
+        start = json.loads(process.stdout.readline())
+        for _ in range(2):
+            listener = Listener(start["uri"], 60)
+            listener.join()
+            assert {n: s.name for n, s in listener.sensors.items()} == {
+                "thumb": "orca-thumb", "middle": "orca-finger", "pinky": "orca-pinky"
+            }  # fmt: skip
+            counts = [
+                np.rint(arrival.samples["middle"][:, 2] / 0.1) for arrival in listener.arrivals
+            ]
+            assert (np.ptp(counts, axis=1) == 0).all() and (np.diff(counts, axis=0) == 1).all()
+            assert counts[0][0] < 100  # of 300
+        process.send_signal(signal.SIGINT)
+        out, _ = process.communicate(timeout=PATIENCE)
+    assert start["sensors"] == {"1": ["thumb"], "3": ["middle"], "5": ["pinky"]}
+    assert json.loads(out)["packets"] >= 120
+
+
+def test_an_orca_hand_has_no_counts(capsys, path):
+    code, _, err = play(capsys, path, "--orca")
+    assert code == 2
+    assert "thumb in count (twin:?sensor=orca-finger fits)" in err.splitlines()[-1]

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from holdfast.sensors import built_in_hands, built_in_sensors, hand, sensor
+from holdfast.sensors.built_in import SENSORS_BY_MAKER
 
 N_TAXELS = {
     "uskin-curved": 30,
@@ -10,10 +11,14 @@ N_TAXELS = {
     "gtac": 15,
     "anyskin": 5,
     "papillarray": 9,
+    "force-button": 1,
     "orca-finger": 87,
     "orca-thumb": 51,
     "orca-pinky": 51,
+    "paxini-120": 120,
+    "xhand": 120,
 }
+NEWTONS = ("papillarray", "force-button", "orca-finger", "orca-thumb", "orca-pinky")
 FINGERTIPS = ("thumb", "index", "middle", "ring")
 
 
@@ -26,6 +31,7 @@ def nearest(positions):
 
 def test_built_in_sensors():
     assert {name: sensor(name).n_taxels for name in built_in_sensors()} == N_TAXELS
+    assert [name for own in SENSORS_BY_MAKER.values() for name in own] == list(N_TAXELS)
 
 
 @pytest.mark.parametrize("name", N_TAXELS)
@@ -35,7 +41,7 @@ def test_every_sensor(name):
     assert one.positions.shape == (one.n_taxels, 3)
     assert one.rotations.shape == (one.n_taxels, 3, 3)
     assert np.linalg.norm(one.normal) == pytest.approx(1, abs=1e-15)
-    assert one.unit == ("N" if name.startswith(("papillarray", "orca")) else "count")
+    assert one.unit == ("N" if name in NEWTONS else "count")
     assert nearest(one.positions).min() > 1e-3
 
 

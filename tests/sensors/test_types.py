@@ -54,15 +54,18 @@ def one_module(indices):
         ({"magnetic": 1}, "pair: magnetic true"),
         ({"range": (1, 0)}, "range of pair"),
         ({"range": (1, 2, 3)}, "range of pair"),
-        ({"step": 0.0}, "pair: a step above 0 expected, 0.0 given"),
+        ({"step": 0.0}, "pair: a step above 0, .* expected, 0.0 given"),
         ({"step": -0.1}, "pair: a step above 0"),
         ({"step": float("nan")}, "pair: a step above 0"),
         ({"step": float("inf")}, "pair: a step above 0"),
         ({"step": True}, "pair: a step above 0"),
         ({"step": "0.1"}, "pair: a step above 0"),
-        ({"step": 2.0, "range": (0, 1)}, "pair: a step within the range of 0 to 1 expected, 2"),
+        ({"step": 2.0, "range": (0, 1)}, "within the range of 0 to 1, expected, 2"),
         ({"rests_at_zero": 1}, "pair: rests_at_zero true or false expected, 1 given"),
-        ({"rests_at_zero": True, "range": (1, 9)}, "pair: .* has zero in its range, 1 to 9 given"),
+        (
+            {"rests_at_zero": True, "range": (1, 9)},
+            "a range with zero expected, 1 to 9 given",
+        ),
     ],
 )
 def test_invalid_fields(fields, message):
@@ -166,11 +169,8 @@ class TestFromJson:
         )
         assert (plain.magnetic, magnetic.magnetic, plain == magnetic) == (False, True, False)
         assert Sensor.from_dict(magnetic.to_dict()) == magnetic
-        assert {name: sensor(name).magnetic for name in built_in_sensors()} == {
-            "uskin-curved": True, "uskin-4x4": True, "uskin-4x6": True, "gtac": False,
-            "anyskin": True, "papillarray": False,
-            "orca-finger": False, "orca-thumb": False, "orca-pinky": False,
-        }  # fmt: skip
+        fields = {"uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin"}
+        assert {name for name in built_in_sensors() if sensor(name).magnetic} == fields
         assert all("magnetic" not in sensor(name).to_dict() for name in built_in_sensors())
 
     def test_step_and_rest_are_written_only_where_they_are_known(self, tmp_path):

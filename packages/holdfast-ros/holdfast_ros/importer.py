@@ -83,7 +83,7 @@ def read(
     """
     with open_bag(path) as bag:
         if not sensors and not columns:
-            yield _BagImport(path, bag).recording()
+            yield _BagImport(path, bag).recording(report)
             return
         wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
         arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
@@ -204,8 +204,11 @@ class _BagImport:
         self._tracks: dict[tuple[str, int], _DeviceTrack] = {}
         self._n_undated = 0
 
-    def recording(self) -> Recording:
+    def recording(self, report: Callable[[str], None]) -> Recording:
         topics = self._tactile_topics()
+        for topic in topics:
+            if topic.decode.note:
+                report(f"{topic.name}: {topic.decode.note}")
         self._read(topics)
         self._n_undated = sum(track.drop_undated() for track in self._tracks.values())
         if not any(track.readings for track in self._tracks.values()):

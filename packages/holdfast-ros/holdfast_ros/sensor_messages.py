@@ -3,6 +3,8 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from math import prod
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +21,7 @@ from holdfast.io.definitions import (
 )
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array, Unit
-from holdfast.sensors.xela_models import module_sensors
+from holdfast.sensors.xela_models import flat_grid, module_sensors
 
 SENS_STREAM = (
     "SensorFull[] sensors\n"
@@ -56,6 +58,26 @@ _SENSOR_STATE_OF_ROS2 = (
     + "bool in_contact\nint32 slip_state\n"
 )
 
+_GEOMETRY = (
+    ROS2_HEADER
+    + SEPARATOR
+    + "geometry_msgs/Point\nfloat64 x\nfloat64 y\nfloat64 z\n"
+    + SEPARATOR
+    + "geometry_msgs/Vector3\nfloat64 x\nfloat64 y\nfloat64 z\n"
+)
+"""Types that definitions of pads refer to."""
+_PADS = {
+    "paxini_hardware/TactileSensor": (
+        "std_msgs/Header header\ngeometry_msgs/Vector3 resultant_force\nTactileTaxel[] taxels\n"
+        + SEPARATOR
+        + "paxini_hardware/TactileTaxel\nuint32 index\ngeometry_msgs/Point position\n"
+        + "geometry_msgs/Vector3 normal\ngeometry_msgs/Vector3 force\n"
+    ),
+    "paxini_pkg/SensingData": "std_msgs/Header header\nint32[] shape\nfloat32[] data\n",
+}
+"""Definitions of two public drivers of PaXini's pads, github.com/adnan-saood/paxini_ros2 and
+github.com/WQisaBG/paxini_ros2. Messages of other packages with these fields are read alike."""
+
 _NO_FORCES = np.empty((0, 3))
 _PILLARS = ("papillarray_ros_v2/SensorState", "sensor_interfaces/SensorState")
 
@@ -86,6 +108,10 @@ MAX_MESSAGE_SIZE = 1 << 20
 """Maximum size of a message of a device; one of a whole hand with all fields has 20 kB [bytes]."""
 PAPILLARRAY = "papillarray"
 """Name of Contactile's sensor, which sends no model name."""
+PAD = "pad"
+"""Model of pads whose messages say nothing about their maker."""
+PAD_FORCES = "force of taxels[] is read [N]; index, position and normal are no readings"
+PAD_DATA = "data is read in the shape of shape[], as counts"
 
 
 def known_definition(name: str) -> Definition | None:
@@ -102,7 +128,16 @@ def known_definition(name: str) -> Definition | None:
     if short in _PILLARS:
         text = _SENSOR_STATE.replace("PACKAGE", package)
         return parse_definition(short, text + ROS2_HEADER)
-    return None
+    return own_definition(short, _PADS[short]) if short in _PADS else None
+
+
+def own_definition(name: str, text: str) -> Definition:
+    """Return the definition in ROS 2 of a message type; headers and vectors may be left out.
+
+    Raises:
+        ValueError: a line is not a field, or a type is not defined.
+    """
+    return parse_definition(short_name(name), text + _GEOMETRY)
 
 
 class SampleDecoder:
@@ -111,6 +146,9 @@ class SampleDecoder:
     Args:
         definition: definition of the messages.
         ros2: whether messages are encoded as in ROS 2; otherwise as in ROS 1.
+
+    Attributes:
+        note: which fields are read, where a message has several that may be readings.
 
     Raises:
         ValueError: the messages are not of a supported type.
@@ -124,6 +162,7 @@ class SampleDecoder:
             text = _SENSOR_STATE_OF_ROS2.replace("PACKAGE", short.partition("/")[0])
             layouts.append(parse_definition(short, text))
         self._layouts = []
+        self.note = ""
         for layout in layouts:
             # By the fields of the messages: packages differ in the names of types.
             paths = field_paths(layout)
@@ -132,6 +171,7 @@ class SampleDecoder:
                 raise ValueError(
                     f"{layout.name} is not supported; supported are {SUPPORTED_MESSAGES}"
                 )
+            self.note = _NOTES.get(convert, "")
             self._layouts.append((convert, MessageDecoder(layout, ros2=ros2)))
 
     def __call__(self, data: bytes) -> list[DeviceSample]:
@@ -160,7 +200,7 @@ class SampleDecoder:
 
 SUPPORTED_MESSAGES = (
     "xela_server_ros/SensStream, xela_server_ros2/SensStream, XStream, xServerMsg, "
-    "XelaServerMsg, SensorState"
+    "XelaServerMsg, SensorState, taxels[] with index and force, and shape[] with data[]"
 )
 """Supported message types, for error messages."""
 
@@ -211,6 +251,32 @@ def from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[
     return [DeviceSample(None, PAPILLARRAY, time, stamp, None, None, forces)]
 
 
+def from_pad(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the sample of a pad whose taxels have an index, a force [N], and more."""
+    taxels = sorted(message["taxels"], key=itemgetter("index"))
+    forces = point_rows([one["force"] for one in taxels])
+    stamp = stamp_seconds(message["header"]["stamp"])
+    return [DeviceSample(None, PAD, None, stamp, None, None, forces)]
+
+
+def from_shaped(message: Mapping[str, Any]) -> list[DeviceSample]:
+    """Return the samples of the pads in an array of (n_pads, n_taxels, 3) or (n_taxels, 3) counts.
+
+    Raises:
+        ValueError: the shape is another.
+    """
+    shape, data = tuple(message["shape"].tolist()), message["data"]
+    if len(shape) not in (2, 3) or shape[-1] != 3 or prod(shape) != data.size:
+        raise ValueError(f"shape (pads, taxels, 3) of {data.size} values expected, {shape} given")
+    stamp = stamp_seconds(message["header"]["stamp"])
+    pads = data.reshape(-1, *shape[-2:])
+    return [
+        DeviceSample(number, PAD, None, stamp, None, pad, _NO_FORCES)
+        for number, pad in enumerate(pads, 1)
+    ]
+
+
+_NOTES: Mapping[object, str] = {from_pad: PAD_FORCES, from_shaped: PAD_DATA}
 _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSample]]], ...] = (
     (
         {
@@ -223,6 +289,12 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
         | axis_paths("sensors[].forces[].", "float32"),
         from_sens_stream,
     ),
+    (
+        {"header.frame_id string", "taxels[].index uint32"}
+        | axis_paths("taxels[].force.", "float64"),
+        from_pad,
+    ),
+    ({"header.frame_id string", "shape[] int32", "data[] float32"}, from_shaped),
     ({"data[].sensor int16"} | axis_paths("data[].xyz[].", "uint32"), from_x_stream),
     (
         {"sensor int16", "model string", "header.frame_id string"}
@@ -285,6 +357,8 @@ def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
         ValueError: the device has another number of taxels than its model.
     """
     readings = readings_of(sample, unit)
+    if sample.model == PAD:
+        return {"": pad_sensor(len(readings), "N" if sample.counts is None else "count")}
     if sample.counts is None:
         pillars = sensor(PAPILLARRAY)
         if len(readings) != pillars.n_taxels:
@@ -296,6 +370,19 @@ def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
     if unit == "count":
         return sensors
     return {name: replace(one, unit=unit, range=None) for name, one in sensors.items()}
+
+
+def pad_sensor(n_taxels: int, unit: Unit) -> Sensor:
+    """Return the sensor of a pad: PaXini's by its number of taxels and unit, else a flat grid.
+
+    Example:
+        >>> pad_sensor(120, "count").name, pad_sensor(24, "N").name
+        ('paxini-120', 'pad-24')
+    """
+    paxini = sensor("paxini-120")
+    if (n_taxels, unit) == (paxini.n_taxels, paxini.unit):
+        return paxini
+    return replace(flat_grid(f"{PAD}-{n_taxels}", n_taxels), unit=unit, range=None)
 
 
 def readings_of(sample: DeviceSample, unit: Unit) -> npt.NDArray[Any]:

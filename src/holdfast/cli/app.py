@@ -32,7 +32,7 @@ VERB_GROUPS = {
         "detect": "Detect the contact state of every finger at every sample.",
         "serve": "Show the estimates of a source on a web page, and publish them.",
         "record": "Record a source; a crash loses at most the last half second.",
-        "play": "Send a recording or the twin as a XELA server does.",
+        "play": "Send a recording or the twin as a XELA server or an ORCA Touch hand does.",
         "import": "Import recordings from other formats.",
         "info": "Show the content of a recording, a folder of them, or a model.",
         "label": "Label recordings on a page or by a rule.",

@@ -1,4 +1,4 @@
-"""`holdfast play`: a simulated XELA server that sends a recording or the twin."""
+"""`holdfast play`: a simulated device that sends a recording or the twin."""
 
 import sys
 from contextlib import ExitStack, suppress
@@ -43,9 +43,12 @@ def play(
         ),
         RARE,
     ] = None,
+    orca: Annotated[
+        bool, typer.Option("--orca", help="Act as an ORCA Touch hand at a pseudo-terminal.")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    r"""Send a recording or the twin as a XELA server does.
+    r"""Send a recording or the twin as a XELA server or an ORCA Touch hand does.
 
     A program for xela_server receives the same packets over a WebSocket, in real time. Their
     times are those of the recording, shifted to now. The modules of an Allegro hand are sent as
@@ -53,6 +56,9 @@ def play(
     --separate, are sent as sensors 1, 2, ... Readings in newtons are sent as calibrated values,
     with counts computed from a data sheet. With --json, the address is printed as JSON, and at
     the end the number of packets. Stop it with Ctrl-C.
+
+    With --orca, a serial port is made, and a program that opens it gets the forces of the fingers
+    as from an ORCA Touch hand, once it has requested them.
 
     SOURCE is the path of a recording, or twin:?object=can&seed=1. It begins when the first client
     connects. When another one connects, the next grasp of the twin begins for all clients (a
@@ -63,6 +69,7 @@ def play(
       holdfast play twin:?object=can
       holdfast play grasp.parquet --once
       holdfast detect builtin:any xela://127.0.0.1:5000
+      holdfast play "twin:?sensor=orca-finger" --orca
     """
     check_speed(source, speed)
     if not speed:
@@ -74,30 +81,33 @@ def play(
         with message_if_slow(awaited(source)):
             from holdfast.devices.sources import open_source
             from holdfast.devices.sources.xela.encoder import is_part_of_hand
+            from holdfast.live.publishers.orca_port import OrcaPort
             from holdfast.live.publishers.xela_server import XelaServer
 
             opened = stack.enter_context(open_source(source, speed=speed, loop=not once))
-        whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
-        server = XelaServer(
-            opened, version=version, host=host, port=port, whole_hand=whole,
-            wait=once, restart=not once,
-        )  # fmt: skip
+        server: XelaServer | OrcaPort
+        if orca:
+            server, what = OrcaPort(opened, restart=not once), "an ORCA Touch hand"
+            modules = server.modules
+        else:
+            whole = is_part_of_hand(opened.sensors) if whole_hand is None else whole_hand
+            server = XelaServer(
+                opened, version=version, host=host, port=port, whole_hand=whole,
+                wait=once, restart=not once,
+            )  # fmt: skip
+            what, modules = f"a XELA server {version}", server.encoder.modules
         with suppress(KeyboardInterrupt), handle_stop_signals(), server:  # Ctrl-C is the usual end
             if as_json:
-                modules = {
-                    str(number): list(names) for number, names in server.encoder.modules.items()
-                }
+                names = {str(number): list(names) for number, names in modules.items()}
                 print_json(
-                    {"uri": server.uri, "version": version, "sensors": modules, "source": source}
+                    {"uri": server.uri, "version": version, "sensors": names, "source": source}
                 )
                 sys.stdout.flush()  # a program that reads the pipe waits for the address
-            print_message(
-                f"{server.uri} sends {source} as a XELA server {version}; Ctrl-C stops it"
-            )
+            print_message(f"{server.uri} sends {source} as {what}; Ctrl-C stops it")
             if hint := getattr(opened, "hint", ""):
                 print_message(hint)
             show_clients(server)
-    if server.failure is not None:
+    if isinstance(server, XelaServer) and server.failure is not None:
         raise server.failure
     if as_json:
         print_json({"packets": server.n_packets})

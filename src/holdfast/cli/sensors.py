@@ -91,18 +91,18 @@ def sensors(
 
 
 def print_all(*, as_json: bool) -> None:
-    """Print the name, taxels, unit and rate of all sensors, and all hands."""
-    from holdfast import sensors as known
+    """Print the name, taxels, unit, rate and maker of all sensors, and all hands."""
+    from holdfast.sensors.built_in import HANDS, SENSORS_BY_MAKER
 
-    skins = [known.sensor(name) for name in known.built_in_sensors()]
-    hands = [known.hand(name) for name in known.built_in_hands()]
+    skins = [(make(), maker) for maker, own in SENSORS_BY_MAKER.items() for make in own.values()]
+    hands = [make() for make in HANDS.values()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
-        facts = [{field: getattr(skin, field) for field in fields} for skin in skins]
+        facts = [{n: getattr(one, n) for n in fields} | {"maker": maker} for one, maker in skins]
         print_json({"sensors": facts, "hands": [hand.to_dict() for hand in hands]})
         return
-    rows = [(skin.name, skin.n_taxels, skin.unit, f"{skin.rate:g} Hz") for skin in skins]
-    print_table(("sensor", "taxels", "unit", "rate"), rows)
+    rows = [(x.name, x.n_taxels, x.unit, f"{x.rate:g} Hz", maker) for x, maker in skins]
+    print_table(("sensor", "taxels", "unit", "rate", "maker"), rows)
     print_line()
     counts = [(hand.name, hand.n_taxels, len(hand.modules)) for hand in hands]
     print_table(("hand", "taxels", "modules"), counts)

@@ -13,7 +13,8 @@ from urllib.parse import parse_qsl, urlsplit
 from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
-from holdfast.sensors import Sensor, built_in_sensors, sensor
+from holdfast.sensors import Sensor
+from holdfast.sensors.files import find_sensor
 
 if TYPE_CHECKING:
     from holdfast.devices.sources.base import Source
@@ -22,9 +23,10 @@ SCHEMES = {
     "xela": "XELA's server: xela://HOST:PORT or xela://auto, ?values=counts|calibrated",
     "twin": "the twin: twin:?object=can&seed=1&case=2&profile=reference",
     "serial": "a serial sensor: serial:///dev/ttyACM0?sensor=anyskin",
+    "orca": "an ORCA Touch hand: orca:///dev/ttyUSB0?baud=921600",
 }
 """URI schemes of the sources, with a description and an example of each."""
-DEVICE_SCHEMES = ("xela", "serial")
+DEVICE_SCHEMES = ("xela", "serial", "orca")
 """Those of devices: the module `holdfast.devices.sources.<scheme>` has a function `source(address)`
 that makes a source."""
 VALUES = ("counts", "calibrated")
@@ -83,12 +85,31 @@ class Address:
         Raises:
             ValueError: `values` is neither.
         """
-        values = self.parameters.get("values", VALUES[0])
-        if values not in VALUES:
-            raise ValueError(
-                f"{self.text}: values={' or '.join(VALUES)} expected, {values!r} given"
-            )
-        return values == "calibrated"
+        return self.choice("values", *VALUES) == "calibrated"
+
+    def choice(self, name: str, *choices: str) -> str:
+        """Return a parameter that has one of some values, by default the first.
+
+        Raises:
+            ValueError: it has another.
+        """
+        value = self.parameters.get(name, choices[0])
+        if value not in choices:
+            expected = " or ".join(choices)
+            raise ValueError(f"{self.text}: {name}={expected} expected, {value!r} given")
+        return value
+
+    def integer(self, name: str, default: int, least: int = 0) -> int:
+        """Return a parameter that is a whole number.
+
+        Raises:
+            ValueError: it is not, or is below `least`.
+        """
+        text = self.parameters.get(name, str(default))
+        if not (text.isascii() and text.isdecimal() and int(text) >= least):
+            expected = f"{name}={default}, a whole number of at least {least}"
+            raise ValueError(f"{self.text}: {expected}, expected, {text!r} given")
+        return int(text)
 
     def sensor(self) -> Sensor | None:
         """Return the sensor of `sensor=FILE.json` or `sensor=NAME`; None without the parameter.
@@ -99,14 +120,8 @@ class Address:
         given = self.parameters.get("sensor")
         if given is None:
             return None
-        # The names are checked here, so that the message has the URI and all of them.
-        if not given.endswith(".json") and given not in (names := built_in_sensors()):
-            raise ValueError(
-                f"{self.text}: sensor=FILE.json or one of {', '.join(names)} "
-                f"expected, {given!r} given"
-            )
         try:
-            return Sensor.from_json(given) if given.endswith(".json") else sensor(given)
+            return find_sensor(given)
         except OSError as cause:
             raise ValueError(f"{self.text}: cannot read {given}: {cause.strerror}") from cause
         except ValueError as cause:

@@ -1,6 +1,7 @@
 """Built-in sensors and hands, made from the tables in the folder `tables`."""
 
 import csv
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from importlib import resources
@@ -11,6 +12,8 @@ from holdfast.sensors.types import Array, Hand, HandModule, Sensor, Unit
 
 UINT16 = (0.0, 65535.0)
 """Smallest and largest reading of XELA's sensors [count]."""
+INT8_UINT8 = (-128.0, 255.0)
+"""Smallest and largest reading of a sensor with int8 along x and y and uint8 along z [count]."""
 
 MODULE_TO_FINGERTIP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Rotation from the frame of the uSCuAH module (x lateral, y distal, z palmar) to the Allegro
@@ -92,6 +95,7 @@ def flat_sensor(
     return replace(grid, positions=np.round(grid.positions, 9))
 
 
+@cache
 def _grid(
     name: str,
     shape: tuple[int, int],
@@ -138,6 +142,7 @@ def anyskin() -> Sensor:
     return Sensor("anyskin", positions, rotations, np.array([0.0, 0.0, 1.0]), rate=100.0)
 
 
+@cache
 def _orca(name: str) -> Sensor:
     """Return an ORCA Touch fingertip. Forces of all taxels have the axes of the module."""
     rows = [row for row in _table("orca.csv") if row["sensor"] == name]
@@ -149,7 +154,7 @@ def _orca(name: str) -> Sensor:
         np.array([0.0, 0.0, 1.0]),
         rate=100.0,
         unit="N",
-        range=(-12.8, 25.5),  # int8 counts along x and y, uint8 counts along z
+        range=(0.1 * INT8_UINT8[0], 0.1 * INT8_UINT8[1]),
         step=0.1,
         rests_at_zero=True,
     )
@@ -183,19 +188,29 @@ def allegro_uskin() -> Hand:
     return Hand("allegro-uskin", modules)
 
 
-SENSORS = {
-    "uskin-curved": uskin_curved,
-    # Pitches of XELA's URDF files of the uSPa44 and the uSPa46.
-    "uskin-4x4": cache(partial(_grid, "uskin-4x4", (4, 4), (4.667e-3, 4.667e-3), 100.0, UINT16)),
-    "uskin-4x6": cache(partial(_grid, "uskin-4x6", (4, 6), (7.24e-3, 7.17e-3), 100.0, UINT16)),
+SENSORS_BY_MAKER: dict[str, dict[str, Callable[[], Sensor]]] = {
+    "XELA": {
+        "uskin-curved": uskin_curved,
+        # Pitches of XELA's URDF files of the uSPa44 and the uSPa46.
+        "uskin-4x4": partial(_grid, "uskin-4x4", (4, 4), (4.667e-3, 4.667e-3), 100.0, UINT16),
+        "uskin-4x6": partial(_grid, "uskin-4x6", (4, 6), (7.24e-3, 7.17e-3), 100.0, UINT16),
+    },
     # 15 sections of fingers with a reading each; nominal positions, 3 a finger.
-    "gtac": cache(partial(_grid, "gtac", (3, 5), (25e-3, 25e-3), 150.0)),
-    "anyskin": anyskin,
-    # 3 x 3 pillars, which send newtons; nominal pitch.
-    "papillarray": cache(partial(_grid, "papillarray", (3, 3), (7e-3, 7e-3), 1000.0, unit="N")),
-    **{name: cache(partial(_orca, name)) for name in ("orca-finger", "orca-thumb", "orca-pinky")},
+    "GTac": {"gtac": partial(_grid, "gtac", (3, 5), (25e-3, 25e-3), 150.0)},
+    "AnySkin": {"anyskin": anyskin},
+    "Contactile": {
+        # 3 x 3 pillars, which send newtons; nominal pitch.
+        "papillarray": partial(_grid, "papillarray", (3, 3), (7e-3, 7e-3), 1000.0, unit="N"),
+        "force-button": partial(_grid, "force-button", (1, 1), (1.0, 1.0), 100.0, unit="N"),
+    },
+    "ORCA": {name: partial(_orca, name) for name in ("orca-finger", "orca-thumb", "orca-pinky")},
+    # 10 lines of 12 points towards the tip; nominal pitch.
+    "PaXini": {"paxini-120": partial(_grid, "paxini-120", (10, 12), (2e-3,) * 2, 60.0, INT8_UINT8)},
+    "Robotera": {"xhand": partial(_grid, "xhand", (10, 12), (2e-3,) * 2, 60.0)},
 }
-"""Functions that make the built-in sensors, by name."""
+"""Functions that make the built-in sensors, by maker and name."""
+SENSORS = {name: make for own in SENSORS_BY_MAKER.values() for name, make in own.items()}
+"""The same by name."""
 HANDS = {"allegro-uskin": allegro_uskin}
 """Functions that make the built-in hands, by name."""
 

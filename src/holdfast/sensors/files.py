@@ -6,7 +6,6 @@ from pathlib import Path
 
 from holdfast.sensors.built_in import (
     built_in_hands,
-    built_in_sensors,
     flat_sensor,
     hand,
     sensor,
@@ -24,12 +23,11 @@ def find_sensor(name: str) -> Sensor:
     """
     if Path(name).suffix.lower() == ".json":
         return Sensor.from_json(name)
-    if name in (names := built_in_sensors()):
+    try:
         return sensor(name)
-    raise ValueError(
-        f"unknown sensor {name!r}; built in are {', '.join(names)}; or give a "
-        ".json file (`holdfast sensors --template 3x3 > sensor.json` makes one)"
-    )
+    except ValueError as cause:
+        hint = "or give a .json file (`holdfast sensors --template 3x3 > sensor.json` makes one)"
+        raise ValueError(f"{cause}; hands: {', '.join(built_in_hands())}; {hint}") from cause
 
 
 def find_layout(name: str, base: str | None) -> Sensor | Hand:
@@ -50,13 +48,7 @@ def find_layout(name: str, base: str | None) -> Sensor | Hand:
         return Sensor.from_urdf(name, base)
     if base is not None:
         raise ValueError(f"--base belongs to a .urdf file; {name!r} given")
-    hands, sensors = built_in_hands(), built_in_sensors()
-    if suffix != ".json" and name not in (*hands, *sensors):
-        raise ValueError(
-            f"unknown sensor or hand {name!r}; built in are {', '.join(sensors + hands)}; "
-            "or give a .json or .urdf file"
-        )
-    return hand(name) if name in hands else find_sensor(name)
+    return hand(name) if name in built_in_hands() else find_sensor(name)
 
 
 def grid_file(grid: str, pitch: float, rate: float, unit: str) -> str:

@@ -28,8 +28,11 @@ MAGNETIC_SENSORS = ("uskin-curved", "uskin-4x4", "uskin-4x6", "anyskin")
 
 The sections of `gtac` lie on different fingers, and half of what they read is no field."""
 
-RESTING_SENSORS = ("gtac",)
+RESTING_SENSORS = ("gtac", "paxini-120", "xhand")
 """Built-in sensors that rest at exact zero. Files do not repeat it for them."""
+
+SAID_BY_NAME = {"magnetic": MAGNETIC_SENSORS, "rests_at_zero": RESTING_SENSORS}
+"""Fields of a sensor that follow from its name, where they are None."""
 
 ROTATION_TOLERANCE = 1e-5
 """Maximum error of a rotation matrix as read; tables are rounded to six digits."""
@@ -92,18 +95,16 @@ class Sensor:
         longest = float(np.abs(normal).max())
         if n_taxels == 0 or longest == 0:
             raise ValueError(f"{self.name}: at least one taxel and a normal that is not zero")
-        if not (np.isfinite(self.rate) and self.rate > 0):
-            raise ValueError(f"{self.name}: a rate above 0 Hz expected, {self.rate} given")
-        if self.rate > MAX_RATE:
-            raise ValueError(
-                f"{self.name}: at most {MAX_RATE:g} Hz expected, {self.rate:g} Hz given"
-            )
+        if not 0 < self.rate <= MAX_RATE:
+            raise ValueError(f"{self.name}: a rate up to 1 MHz expected, {self.rate} given")
         if self.unit not in ("count", "N"):
             raise ValueError(f"{self.name}: unit 'count' or 'N' expected, {self.unit!r} given")
-        magnetic = self.name in MAGNETIC_SENSORS if self.magnetic is None else self.magnetic
-        if not isinstance(magnetic, bool):
-            raise ValueError(f"{self.name}: magnetic true or false expected, {magnetic!r} given")
-        object.__setattr__(self, "magnetic", magnetic)
+        for field, names in SAID_BY_NAME.items():
+            flag = getattr(self, field)
+            flag = self.name in names if flag is None else flag
+            if not isinstance(flag, bool):
+                raise ValueError(f"{self.name}: {field} true or false expected, {flag!r} given")
+            object.__setattr__(self, field, flag)
         if self.range is not None:
             ends = _array(self.range, f"range of {self.name}", (2,))
             low, high = ends.tolist()
@@ -129,25 +130,12 @@ class Sensor:
         low, high = self.range or (-np.inf, np.inf)
         if self.step is not None:
             is_number = isinstance(self.step, int | float) and not isinstance(self.step, bool)
-            if not (is_number and 0 < self.step < np.inf):
-                raise ValueError(f"{self.name}: a step above 0 expected, {self.step!r} given")
-            if self.step > high - low:
-                raise ValueError(
-                    f"{self.name}: a step within the range of {low:g} to {high:g} expected, "
-                    f"{self.step:g} given"
-                )
+            if not (is_number and 0 < self.step < np.inf and self.step <= high - low):
+                expected = f"a step above 0, within the range of {low:g} to {high:g}, expected"
+                raise ValueError(f"{self.name}: {expected}, {self.step!r} given")
             object.__setattr__(self, "step", float(self.step))
-        if self.rests_at_zero is None:
-            object.__setattr__(self, "rests_at_zero", self.name in RESTING_SENSORS)
-        if not isinstance(self.rests_at_zero, bool):
-            raise ValueError(
-                f"{self.name}: rests_at_zero true or false expected, {self.rests_at_zero!r} given"
-            )
         if self.rests_at_zero and not low <= 0 <= high:
-            raise ValueError(
-                f"{self.name}: a sensor that rests at zero has zero in its range, "
-                f"{low:g} to {high:g} given"
-            )
+            raise ValueError(f"{self.name}: a range with zero expected, {low:g} to {high:g} given")
 
     def __repr__(self) -> str:
         return f"Sensor({self.name!r}, {self.n_taxels} taxels, {self.rate:g} Hz, {self.unit})"
@@ -197,12 +185,10 @@ class Sensor:
             "range": None if self.range is None else list(self.range),
         }
         # Only what the name does not say: files of built-in sensors are as before version 0.4.
-        if self.magnetic != (self.name in MAGNETIC_SENSORS):
-            fields["magnetic"] = self.magnetic
-        if self.step is not None:
-            fields["step"] = self.step
-        if self.rests_at_zero != (self.name in RESTING_SENSORS):
-            fields["rests_at_zero"] = self.rests_at_zero
+        for field in ("magnetic", "step", "rests_at_zero"):
+            value = getattr(self, field)
+            if value not in (None, self.name in SAID_BY_NAME.get(field, ())):
+                fields[field] = value
         return fields
 
     @classmethod
@@ -221,18 +207,7 @@ class Sensor:
             raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
         if missing := sorted(needed - set(data)):
             raise ValueError(f"fields {missing} are missing in a sensor; it needs {sorted(needed)}")
-        return cls(
-            name=str(data["name"]),
-            positions=data["positions"],
-            rotations=data["rotations"],
-            normal=data["normal"],
-            rate=float(data["rate"]),
-            unit=data.get("unit", "count"),
-            range=data.get("range"),
-            magnetic=data.get("magnetic"),
-            step=data.get("step"),
-            rests_at_zero=data.get("rests_at_zero"),
-        )
+        return cls(**{**data, "name": str(data["name"]), "rate": float(data["rate"])})
 
     @classmethod
     def from_json(cls, path: str | Path) -> Self:

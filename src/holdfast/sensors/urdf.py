@@ -14,8 +14,6 @@ MAX_URDF_SIZE = 1 << 26
 
 LinkPose = tuple[Array, Array]
 """Position [m] and rotation matrix."""
-Quaternion = tuple[float, float, float, float]
-"""x, y, z, w."""
 
 
 def taxel_poses(path: Path, base: str, match: str) -> tuple[Array, Array]:
@@ -96,31 +94,10 @@ class _Joint:
 
 
 def _rotation(roll: float, pitch: float, yaw: float) -> Array:
-    """Return the rotation matrix of roll, pitch and yaw [rad]: about x, then y, then z.
-
-    It is computed by a quaternion, as SciPy does, and equals SciPy's to the last bit.
-    """
-    turns = (
-        (math.sin(roll / 2), 0.0, 0.0, math.cos(roll / 2)),
-        (0.0, math.sin(pitch / 2), 0.0, math.cos(pitch / 2)),
-        (0.0, 0.0, math.sin(yaw / 2), math.cos(yaw / 2)),
-    )
-    x, y, z, w = _product(turns[2], _product(turns[1], turns[0]))
-    xx, yy, zz, ww = x * x, y * y, z * z, w * w
-    return np.array(
-        [
-            [xx - yy - zz + ww, 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), -xx + yy - zz + ww, 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), -xx - yy + zz + ww],
-        ]
-    )
-
-
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Return the quaternion of rotation b followed by rotation a."""
-    return (
-        a[3] * b[0] + b[3] * a[0] + (a[1] * b[2] - a[2] * b[1]),
-        a[3] * b[1] + b[3] * a[1] + (a[2] * b[0] - a[0] * b[2]),
-        a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0]),
-        a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2],
-    )
+    """Return the rotation matrix of roll, pitch and yaw [rad]: about x, then y, then z."""
+    (cx, cy, cz), (sx, sy, sz) = ([f(a) for a in (roll, pitch, yaw)] for f in (math.cos, math.sin))
+    about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+    about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+    result: Array = about_z @ about_y @ about_x
+    return result

@@ -1,11 +1,11 @@
 """Layouts of XELA's sensors, by the model names that its servers send."""
 
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from holdfast.sensors import Hand, Sensor, hand, sensor
+from holdfast.sensors import Hand, Sensor, flat_sensor, hand, sensor
 from holdfast.sensors.built_in import UINT16
 
 XELA_HANDS = {"xr23ahlcpp": "allegro-uskin", "xr23ahrcpp": "allegro-uskin"}
@@ -98,10 +98,5 @@ def flat_grid(name: str, n_taxels: int) -> Sensor:
     """
     # Complete rows: the layout is unknown, and a row with gaps would invent more of it.
     n_rows = max(k for k in range(1, int(n_taxels**0.5) + 1) if n_taxels % k == 0)
-    n_columns = n_taxels // n_rows
-    row, column = np.divmod(np.arange(n_taxels), n_columns)
-    x, y = column - (n_columns - 1) / 2, (n_rows - 1) / 2 - row
-    positions = DEFAULT_PITCH * np.column_stack([x, y, np.zeros(n_taxels)])
-    rotations = np.tile(np.eye(3), (n_taxels, 1, 1))
-    normal = np.array([0.0, 0.0, 1.0])
-    return Sensor(name, positions, rotations, normal, UNKNOWN_MODEL_RATE, range=UINT16)
+    grid = flat_sensor(name, n_rows, n_taxels // n_rows, DEFAULT_PITCH, UNKNOWN_MODEL_RATE)
+    return replace(grid, range=UINT16)

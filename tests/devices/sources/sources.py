@@ -12,6 +12,7 @@ import numpy as np
 import holdfast.devices.sources.serial
 import holdfast.devices.sources.twin
 from devices.sources.board import Board, packet, some
+from devices.sources.orca.hand import Hand, some_frames
 from holdfast.devices.sources import Source, open_source
 from holdfast.io import save_recording
 from holdfast.live.publishers.xela_server import XelaServer
@@ -129,6 +130,16 @@ def xela(folder, monkeypatch):
             yield Ready(open_source(server.uri), pads.hush)
 
 
+@contextmanager
+def orca(folder, monkeypatch):
+    frames, _ = some_frames(N_SOON)
+    hand = Hand(frames * 100)
+    try:
+        yield Ready(open_source(f"orca://{hand.path}"), hand.hush)
+    finally:
+        hand.close()
+
+
 class _Pads(Source):
     """Source without the module that a XELA server cannot have; `hush` makes it silent."""
 
@@ -160,11 +171,21 @@ class _Pads(Source):
 
 EVERY = {
     make.__name__: make
-    for make in (parquet, mcap, parquet_at_once, mcap_at_once, twin, twin_at_once, serial, xela)
+    for make in (
+        parquet,
+        mcap,
+        parquet_at_once,
+        mcap_at_once,
+        twin,
+        twin_at_once,
+        serial,
+        orca,
+        xela,
+    )
 }
 ENDING = {make.__name__: make for make in (parquet_at_once, mcap_at_once, twin_at_once)}
 """Sources that end."""
-LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, xela)}
+LASTING = {make.__name__: make for make in (parquet, mcap, twin_slow, serial, orca, xela)}
 """Sources that become silent, and do not end."""
 
 

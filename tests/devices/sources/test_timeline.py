@@ -1,11 +1,17 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import Fault
-from holdfast.devices.sources.timeline import Timeline, TransportDelay, clock_notice
+from holdfast.devices.sources.timeline import (
+    ArrivalClock,
+    Timeline,
+    TransportDelay,
+    clock_notice,
+)
 
 PERIOD = 1 / 150
 
@@ -234,3 +240,37 @@ def test_a_delay_after_a_reset():
 def test_stamps_of_another_time(stamp, words):
     notice = clock_notice(stamp, 1.7e9)
     assert notice is None if words is None else words in notice
+
+
+class TestArrivalClock:
+    @pytest.mark.parametrize("rate", [50.0, 150.0, 1000.0])
+    @pytest.mark.parametrize("latency", [0.0, 0.016])
+    @pytest.mark.parametrize("jitter", [0.0, 0.5e-3])
+    def test_bursts_of_an_even_device_have_even_times(self, rate, latency, jitter):
+        """A USB adapter passes on what came in 16 ms, at once or in pieces."""
+        sent = np.arange(int(10 * rate)) / rate
+        due = np.ceil(sent / latency) * latency if latency else sent
+        delays = np.random.default_rng(0).exponential(jitter, len(sent))
+        arrived, sizes = np.unique(np.maximum.accumulate(due + delays), return_counts=True)
+        clock, times, received = ArrivalClock(None), [], []
+        for at, n in zip(arrived.tolist(), sizes.tolist(), strict=True):
+            new = clock.times(n, at)
+            times += new
+            received += [at] * len(new)
+        times, received = np.array(times), np.array(received)
+        assert len(times) > 0.9 * len(sent)
+        steps = np.diff(times)
+        assert (steps > 0).all() and (times <= received).all()
+        late = received - times
+        assert late.max() < latency + 2 / rate + 0.01
+        settled = steps[len(steps) // 5 :]
+        assert settled.mean() == pytest.approx(1 / rate, rel=0.01)
+        # The rate of a stream is the mean of the steps up to three times the median.
+        kept = settled[settled <= 3 * np.median(settled)]
+        assert 1 / kept.mean() == pytest.approx(rate, rel=0.1)
+
+    def test_a_pause_is_a_pause(self):
+        clock = ArrivalClock(0.01)
+        before = [clock.times(1, 0.01 * k)[0] for k in range(100)]
+        assert before[-1] == pytest.approx(0.99)
+        assert clock.times(3, 5.0) == pytest.approx([4.98, 4.99, 5.0])

@@ -9,9 +9,9 @@ from holdfast.devices.sources.timeline import is_plausible
 from holdfast.devices.sources.xela.decoder import no_calibration
 from holdfast.devices.sources.xela.devices import xela_devices
 from holdfast.errors import SourceError
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import Sensor
 from holdfast.sensors.types import Unit
-from holdfast_ros.sensor_messages import PAPILLARRAY, DeviceSample, readings_of
+from holdfast_ros.sensor_messages import PAD, PAPILLARRAY, DeviceSample, readings_of, sensors_of
 
 _STAMPS: tuple[Callable[[DeviceSample], float | None], ...] = (
     lambda sample: plausible_time(sample.time),
@@ -70,10 +70,12 @@ class MessageAssembler:
         for number, one in found.items():
             if one.counts is not None and self._unit == "N" and not len(one.forces):
                 raise SourceError(no_calibration(number, one.model))
-        # Only a PapillArray sends newtons without counts.
-        hubs = [number for number, one in found.items() if one.counts is None]
-        if hubs:
-            devices = {number: self._papillarray(number, found[number]) for number in hubs}
+        # Those of XELA's server have models of their own.
+        if any(one.model in (PAPILLARRAY, PAD) for one in found.values()):
+            if unknown := sorted(set(self._names) - set(found)):
+                there = ", ".join(f"{number} ({one.model})" for number, one in found.items())
+                raise SourceError(f"fingers= names {unknown[0]}; the topic has {there}")
+            devices = {number: self._pad(number, one) for number, one in found.items()}
         else:
             models = {n: (x.model, len(readings_of(x, self._unit))) for n, x in found.items()}
             calibrated = self._unit == "N"
@@ -117,17 +119,16 @@ class MessageAssembler:
         self._assembler.refuse("message", f"invalid message: {reason}", received)
         return self._assembler.finish(received)
 
-    def _papillarray(self, number: int, sample: DeviceSample) -> Device:
-        if unknown := sorted(set(self._names) - {number}):
-            raise SourceError(
-                f"fingers= names {', '.join(map(str, unknown))}; the topic has 1 ({PAPILLARRAY})"
-            )
-        built_in = self._sensor or sensor(PAPILLARRAY)
-        if len(sample.forces) != built_in.n_taxels:
-            raise SourceError(
-                f"{len(sample.forces)} taxels given, {built_in.n_taxels} expected ({built_in.name})"
-            )
-        return Device(number, PAPILLARRAY, {self._names.get(number, f"finger{number}"): built_in})
+    def _pad(self, number: int, sample: DeviceSample) -> Device:
+        try:
+            pad = self._sensor or sensors_of(sample, self._unit)[""]
+        except ValueError as cause:
+            raise SourceError(str(cause)) from cause
+        n_taxels = len(readings_of(sample, self._unit))
+        if n_taxels != pad.n_taxels:
+            raise SourceError(f"{n_taxels} taxels given, {pad.n_taxels} expected ({pad.name})")
+        name = self._names.get(number, f"finger{number}")
+        return Device(number, sample.model, {name: pad})
 
     def _is_new(self, sample: DeviceSample, received: float) -> bool:
         """Return whether it is a new sample of a known device with its number of taxels."""

@@ -8,14 +8,25 @@ from typing import NamedTuple
 from holdfast.devices.sources.base import DeviceSource, Source
 from holdfast.devices.uri import Address
 from holdfast.errors import SourceError
+from holdfast.files import read_input
 from holdfast.sensors.types import Unit
 from holdfast_ros import dds
-from holdfast_ros.sensor_messages import DeviceSample, SampleDecoder, known_definition
+from holdfast_ros.sensor_messages import (
+    DeviceSample,
+    SampleDecoder,
+    known_definition,
+    own_definition,
+)
 from holdfast_ros.sources.message_assembler import MessageAssembler, has_taxels
 
 DISCOVERY_INTERVAL = 0.05
 """Time between two checks for the first publisher [s]."""
-SUPPORTED_TYPES = "xela_server_ros2/SensStream, sensor_interfaces/SensorState"
+SUPPORTED_TYPES = (
+    "xela_server_ros2/SensStream, sensor_interfaces/SensorState, paxini_hardware/TactileSensor, "
+    "paxini_pkg/SensingData; give others of a pad by ?definition=FILE.msg"
+)
+MAX_DEFINITION_SIZE = 2**16
+"""Maximum size of the file of a definition [bytes]."""
 TOPIC_OPEN_TIMEOUT = 5.0
 """Longest wait for the first message with samples [s]."""
 DEVICES_TIMEOUT = 1.0
@@ -30,14 +41,20 @@ def source(address: Address) -> Source:
     """Return the source of a URI; entering it subscribes.
 
     `ros2:///TOPIC`. Parameters: `domain=0` (by default that of `ROS_DOMAIN_ID`),
-    `values=counts` or `values=calibrated`, `fingers=1:thumb,2:index`, `sensor=FILE.json`.
+    `values=counts` or `values=calibrated`, `fingers=1:thumb,2:index`, `sensor=FILE.json`, and
+    `definition=FILE.msg` of a message type of pads that is not known here.
 
     Raises:
         ValueError: the address or a parameter is not valid.
     """
-    address.only("domain", "values", "fingers", "sensor")
-    domain = dds.domain_number(address.parameters.get("domain"))
-    return TopicSource(address, Subscription(topic_of(address), domain))
+    address.only("domain", "values", "fingers", "sensor", "definition")
+    domain, text = dds.domain_number(address.parameters.get("domain")), ""
+    if path := address.parameters.get("definition"):
+        try:
+            text = read_input(path, MAX_DEFINITION_SIZE).decode()
+        except (OSError, ValueError) as cause:
+            raise ValueError(f"{address.text}: cannot read {path}: {cause}") from cause
+    return TopicSource(address, Subscription(topic_of(address), domain, text))
 
 
 def state() -> str:
@@ -63,11 +80,18 @@ class Subscription:
     Args:
         topic: name of the topic, `/xServTopic`.
         domain: number of the ROS domain.
+        definition: definition of its messages; empty for those that are known.
+
+    Attributes:
+        note: which fields of the messages are read, where there is a choice.
     """
 
-    def __init__(self, topic: str, domain: int) -> None:
+    note = ""
+
+    def __init__(self, topic: str, domain: int, definition: str = "") -> None:
         self._topic = topic
         self._domain = domain
+        self._definition = definition
         self._node: dds.Node | None = None
         self._reader: dds.TopicReader | None = None
         self._decoder: SampleDecoder | None = None
@@ -85,12 +109,17 @@ class Subscription:
             if time.monotonic() >= deadline:
                 raise SourceError(self.why_no_message())
             time.sleep(DISCOVERY_INTERVAL)
-        definition = known_definition(kind)
-        if definition is None:
-            raise SourceError(
-                f"{self._topic} has messages of type {kind}; supported types: {SUPPORTED_TYPES}"
-            )
-        self._decoder = SampleDecoder(definition, ros2=True)
+        try:
+            given = self._definition
+            definition = own_definition(kind, given) if given else known_definition(kind)
+            if definition is None:
+                raise SourceError(
+                    f"{self._topic} has messages of type {kind}; supported types: {SUPPORTED_TYPES}"
+                )
+            self._decoder = SampleDecoder(definition, ros2=True)
+        except ValueError as cause:
+            raise SourceError(f"{self._topic}: {cause}") from cause
+        self.note = self._decoder.note
         self._reader = self._node.reader(self._topic, definition)
 
     def take(self, timeout: float) -> ReceivedMessage | None:
@@ -167,6 +196,7 @@ class TopicSource(DeviceSource):
         now = self._checked_at = time.monotonic()
         self.begin_reading(now)
         notices = [text for device in self._assembler.devices.values() for text in device.notices]
+        notices += [self._subscription.note] if self._subscription.note else []
         if notices:
             self.notify(now, *notices)
         # The messages that identified the devices have samples, too.

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.live import Live
     from rich.progress import Progress
 
+    from holdfast.live.publishers.orca_port import OrcaPort
     from holdfast.live.publishers.xela_server import XelaServer
     from holdfast.live.recorder import Recorder, RecorderStatus
 
@@ -264,7 +265,7 @@ def format_size(n_bytes: int) -> str:
     return f"{n_bytes / 1e3:.1f} kB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"
 
 
-def show_clients(server: "XelaServer") -> None:
+def show_clients(server: "XelaServer | OrcaPort") -> None:
     """Show the number of clients of a server until it ends.
 
     A terminal has one line that is overwritten, with the rate; elsewhere each change is a line.

@@ -1,13 +1,19 @@
-"""Source of a sensor at a serial port: AnySkin and ReSkin boards."""
+"""Sources of sensors at a serial port: what all share, and AnySkin and ReSkin boards."""
 
 import math
 import time
+from abc import abstractmethod
+from collections.abc import Sequence
 from errno import EACCES, ENOENT
 from importlib.metadata import version
+from typing import Any
+
+import numpy.typing as npt
 
 from holdfast.devices.sources.anyskin import AnySkinDecoder, DecodedBytes
 from holdfast.devices.sources.assembler import Assembler, Device
 from holdfast.devices.sources.base import DeviceSource, Source
+from holdfast.devices.sources.timeline import ArrivalClock
 from holdfast.devices.uri import Address
 from holdfast.errors import MissingExtra, SourceError
 from holdfast.sensors import Sensor, sensor
@@ -23,39 +29,59 @@ SERIAL_OPEN_TIMEOUT = 3.0
 DEFAULT_BAUD = 115200
 MAX_READ_SIZE = 1 << 16
 """Largest number of bytes to read at a time."""
-_BOARD = 1
+BOARD = 1
 """Number of the board as a device."""
 
 
-class SerialSource(DeviceSource):
-    """Source of a board of magnetometers at a serial port.
+class PortSource(DeviceSource):
+    """Source of a device at a serial port, which has no clock.
 
-    The board has no clock: the time of a sample is its time of arrival, on the host's monotonic
-    clock. Samples that arrive together are a period of the sensor apart, or less if they would
-    begin before the last sample.
+    The time of a sample follows from that of its arrival, on the host's monotonic clock (see
+    `ArrivalClock`). A subclass has the decoder of the bytes.
+
+    Attributes:
+        problem: what is wrong with the newest bytes, if waiting does not change it; else empty.
+        assembler: collector of what the subclass reports.
 
     Args:
-        address: `serial:///dev/ttyACM0?sensor=anyskin&fingers=1:index&baud=115200&mags=5`.
+        address: its path is the port; `baud` is the speed.
+        baud: speed if the address has none [bit/s].
+        period: nominal time between two samples [s]; None if it is measured.
 
     Raises:
-        ValueError: a parameter is not valid.
+        ValueError: there is no port, or the speed is not valid.
     """
 
-    def __init__(self, address: Address) -> None:
+    max_wait = math.inf
+    """Maximum time to wait for bytes before `request` is called again [s]."""
+
+    def __init__(self, address: Address, baud: int, period: float | None) -> None:
         super().__init__()
-        address.only("sensor", "fingers", "baud", "mags")
-        self.name = address.text
+        self.name, self.problem = address.text, ""
         self._path = address.host + address.path
         if not self._path:
-            raise ValueError(f"{address.text}: a port expected, as in serial:///dev/ttyACM0")
-        self._baud = _positive(address, "baud", DEFAULT_BAUD)
-        self._sensor = address.sensor() or sensor("anyskin")
-        self._n_mags = _positive(address, "mags", self._sensor.n_taxels)
-        modules = dict.fromkeys(_modules(address, self._n_mags, self._sensor), self._sensor)
-        self._board = Device(_BOARD, self._sensor.name, modules)
-        self._decoder = AnySkinDecoder(self._n_mags)
-        self._assembler = Assembler()
+            scheme = address.text.partition(":")[0]
+            raise ValueError(f"{address.text}: a port expected, as in {scheme}:///dev/ttyACM0")
+        self.baud = address.integer("baud", baud, 1)
+        self._period = period
+        self.assembler = Assembler()
         self._port: Serial | None = None
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Begin to decode, after the port was opened: what came before is forgotten."""
+
+    @abstractmethod
+    def decode(self, data: bytes, received: float) -> Sequence[npt.NDArray[Any]]:
+        """Return the samples in the next bytes; report what is refused to the assembler."""
+
+    @abstractmethod
+    def explain_silence(self) -> str:
+        """Return why there was no sample after `SERIAL_OPEN_TIMEOUT`."""
+
+    def request(self, now: float) -> bytes:
+        """Return the bytes to send now."""
+        return b""
 
     def open(self) -> None:
         """Open the port, and wait for the first sample.
@@ -64,48 +90,35 @@ class SerialSource(DeviceSource):
             SourceError: there is no such port, it cannot be opened, or no sample comes.
         """
         self.close()
-        self._assembler = Assembler()
-        self._assembler.devices = {_BOARD: self._board}
-        self._newest = -math.inf
+        self.assembler = Assembler()
+        self.sensors = {}
+        self._clock = ArrivalClock(self._period)
         try:
             self._connect()
-            deadline, n_refused = time.monotonic() + SERIAL_OPEN_TIMEOUT, 0
-            while not (decoded := self._read_port(max(deadline - time.monotonic(), 0.0))).samples:
-                if decoded.other_n_mags:  # waiting longer would not change it
-                    raise SourceError(f"{self.name}: {self._wrong_count(decoded)}")
-                n_refused += decoded.n_refused
-                if time.monotonic() >= deadline:
-                    came = f"{n_refused} invalid packets came" if n_refused else "nothing came"
-                    raise SourceError(
-                        f"{self.name}: {came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of "
-                        f"{self._n_mags} magnetometers at {self._baud} baud expected"
-                    )
+            deadline = time.monotonic() + SERIAL_OPEN_TIMEOUT
+            while not self._read_port(max(deadline - time.monotonic(), 0.0)):
+                if self.problem or time.monotonic() >= deadline:
+                    raise SourceError(f"{self.name}: {self.problem or self.explain_silence()}")
         except (OSError, ValueError) as cause:  # ValueError: the port does not support the speed
             ports = ", ".join(sorted(port.device for port in comports())) or "none"
             raise SourceError(f"{self.name}: {_reason(cause)}; serial ports: {ports}") from cause
-        self.sensors = self._board.modules
-        self.metadata = {
-            "source": self.name,
-            "sensor": self._sensor.name,
-            "n_mags": self._n_mags,
-            "pyserial": version("pyserial"),
-        }
+        self.sensors = self.assembler.sensors
+        self.metadata = {"source": self.name, "pyserial": version("pyserial")}
         self.begin_reading(time.monotonic())
 
     def _connect(self) -> None:
-        self._decoder.reset()
+        self.begin()
         # Exclusive: two programs would each get half of the bytes.
-        self._port = Serial(self._path, self._baud, exclusive=True)
+        self._port = Serial(self._path, self.baud, exclusive=True)
 
     def receive(self, timeout: float) -> bool:
         """Process what the device sends within `timeout` [s]; return False if nothing came."""
         try:
-            decoded = self._read_port(timeout)
+            return self._read_port(timeout) > 0
         except OSError as cause:
             self.disconnect()
             self.lose(_reason(cause))
             return False
-        return bool(decoded.samples)
 
     def reconnect(self) -> bool:
         """Try to connect again; return whether the device is connected."""
@@ -121,38 +134,76 @@ class SerialSource(DeviceSource):
             self._port.close()
             self._port = None
 
-    def _read_port(self, timeout: float) -> DecodedBytes:
-        """Queue the samples that come within `timeout` [s], and return them.
+    def _read_port(self, timeout: float) -> int:
+        """Queue the samples that come within `timeout` [s], and return their number.
 
         Raises:
             OSError: the port was disconnected.
         """
         if self._port is None:
-            return DecodedBytes([], 0, 0)
-        self._port.timeout = timeout
-        # One byte waits for the board; then what is there already, without another wait.
+            return 0
+        if to_send := self.request(time.monotonic()):
+            self._port.write(to_send)
+        self._port.timeout = min(timeout, self.max_wait)
+        # One byte waits for the device; then what is there already, without another wait.
         data = self._port.read(1)
         if data:
             data += self._port.read(min(self._port.in_waiting, MAX_READ_SIZE))
-        decoded, received = self._decoder.feed(data), time.monotonic()
-        if decoded.n_refused:
-            self._assembler.n_refused += decoded.n_refused
-            if decoded.other_n_mags:
-                self._assembler.report_taxel_count(_BOARD, self._wrong_count(decoded), received)
-            else:
-                self._assembler.notify("packet", "invalid packets are dropped", received)
-            self.queue(self._assembler.finish(received), received)
-        n = len(decoded.samples)
-        period = 1 / self._sensor.rate
-        # Spread over their period, but not back beyond the newest sample.
-        step = min(period, (received - self._newest) / max(n, 1))
-        for k, sample in enumerate(decoded.samples):
-            self._assembler.stamp(received - (n - 1 - k) * step, received)
-            self._assembler.add(_BOARD, sample)
-            arrivals = self._assembler.finish(received)
-            self._newest = arrivals[-1].time
-            self.queue(arrivals, received)
-        return decoded
+        received = time.monotonic()
+        samples = self.decode(data, received)
+        if reports := self.assembler.finish(received):
+            self.queue(reports, received)
+        times = self._clock.times(len(samples), received)
+        for at, sample in zip(times, samples, strict=False):
+            self.assembler.stamp(at, received)
+            self.assembler.add(BOARD, sample)
+            self.queue(self.assembler.finish(received), received)
+        return len(times)
+
+
+class SerialSource(PortSource):
+    """Source of a board of magnetometers at a serial port.
+
+    Args:
+        address: `serial:///dev/ttyACM0?sensor=anyskin&fingers=1:index&baud=115200&mags=5`.
+
+    Raises:
+        ValueError: a parameter is not valid.
+    """
+
+    def __init__(self, address: Address) -> None:
+        address.only("sensor", "fingers", "baud", "mags")
+        self._sensor = address.sensor() or sensor("anyskin")
+        super().__init__(address, DEFAULT_BAUD, 1 / self._sensor.rate)
+        self._n_mags = address.integer("mags", self._sensor.n_taxels, 1)
+        modules = dict.fromkeys(_modules(address, self._n_mags, self._sensor), self._sensor)
+        self._devices = {BOARD: Device(BOARD, self._sensor.name, modules)}
+        self._decoder = AnySkinDecoder(self._n_mags)
+
+    def begin(self) -> None:
+        """Begin to decode, after the port was opened."""
+        self._n_refused, self.assembler.devices = 0, self._devices
+        self._decoder.reset()
+
+    def decode(self, data: bytes, received: float) -> Sequence[npt.NDArray[Any]]:
+        """Return the samples in the next bytes."""
+        decoded = self._decoder.feed(data)
+        self.problem = self._wrong_count(decoded) if decoded.other_n_mags else ""
+        self._n_refused += decoded.n_refused
+        self.assembler.n_refused += decoded.n_refused
+        if decoded.n_refused and self.problem:
+            self.assembler.report_taxel_count(BOARD, self.problem, received)
+        elif decoded.n_refused:
+            self.assembler.notify("packet", "invalid packets are dropped", received)
+        return decoded.samples
+
+    def explain_silence(self) -> str:
+        """Return why there was no sample."""
+        came = f"{self._n_refused} invalid packets came" if self._n_refused else "nothing came"
+        return (
+            f"{came} within {SERIAL_OPEN_TIMEOUT:g} s; packets of {self._n_mags} magnetometers "
+            f"at {self.baud} baud expected"
+        )
 
     def _wrong_count(self, decoded: DecodedBytes) -> str:
         return (
@@ -173,13 +224,6 @@ def source(address: Address) -> Source:
 def state() -> str:
     """Return the serial ports of this machine."""
     return ", ".join(port.device for port in comports()) or "no serial port"
-
-
-def _positive(address: Address, name: str, default: int) -> int:
-    text = address.parameters.get(name, str(default))
-    if not (text.isascii() and text.isdecimal() and int(text)):
-        raise ValueError(f"{address.text}: {name}={default}, at least 1, expected, {text!r} given")
-    return int(text)
 
 
 def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:

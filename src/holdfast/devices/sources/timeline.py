@@ -19,6 +19,12 @@ MAX_CONSTANT_CHANGE = 0.01
 minimum on a busy machine varies by a few ms, a queue that grows by 1 % changes by 15 ms."""
 MAX_CLOCK_DRIFT = 1e-4
 """Largest drift between two clocks [s/s]."""
+CLOCK_GAIN = 0.1
+"""Share of the delay of its arrival by which a sample is later than its period says."""
+COUNTING_TIME = 0.3
+"""Time over which samples are counted to measure their period [s]."""
+MAX_COUNTED_PAUSE = 0.2
+"""After a longer pause, counting begins again [s]."""
 MAX_TIME = 1e11
 """Largest stamp: 3,000 years from 1970 [s]. Doubles still resolve 0.1 ms there."""
 PACE_INTERVAL = 0.25
@@ -116,6 +122,53 @@ class TransportDelay:
         if not math.isfinite(self._least):
             return 0.0
         return MAX_CLOCK_DRIFT * max(received - self._received, 0.0)
+
+
+class ArrivalClock:
+    """Clock of a device that has none and sends evenly, while its samples arrive in bursts.
+
+    The period is measured by counting. A sample is a period later than the one before it, and the
+    clock follows the arrivals slowly. No sample is later than its arrival.
+
+    Args:
+        period: nominal period [s]; None if it must be measured before the first sample.
+
+    Example:
+        >>> clock = ArrivalClock(0.01)
+        >>> [round(t, 3) for n, at in ((1, 5.0), (1, 5.03), (2, 5.031)) for t in clock.times(n, at)]
+        [5.0, 5.012, 5.021, 5.031]
+    """
+
+    def __init__(self, period: float | None) -> None:
+        self._period = period
+        self._time = -math.inf  # of the newest sample
+        # When the samples before the newest ones came; and since when, and how many, are counted.
+        self._received, self._since, self._n = -math.inf, math.nan, 0
+
+    def times(self, n: int, received: float) -> list[float]:
+        """Return the times of `n` samples that arrive together [s]; none before the period."""
+        if not n:
+            return []
+        self._measure(n, received)
+        if self._period is None:
+            return []
+        end = self._time + n * self._period
+        if 0.0 <= received - end <= MIN_LATE_DELAY:
+            end += CLOCK_GAIN * (received - end)
+            step = (end - self._time) / n
+        else:  # the first ones, after a pause, or sooner than the period says
+            end, step = received, min(self._period, (received - self._time) / n)
+        self._time = end
+        return [end - (n - 1 - k) * step for k in range(n)]
+
+    def _measure(self, n: int, received: float) -> None:
+        self._n += n
+        passed, pause = received - self._since, received - self._received
+        if pause <= MAX_COUNTED_PAUSE and passed >= COUNTING_TIME:
+            self._period = passed / self._n
+        if pause > MAX_COUNTED_PAUSE or passed >= COUNTING_TIME:
+            self._since, self._n = received, 0
+        self._received = received
 
 
 class ClockPace:

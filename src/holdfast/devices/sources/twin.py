@@ -209,11 +209,11 @@ def grasp_of(address: Address) -> Grasp:
     given = address.parameters
     grasp = Grasp(
         given.get("object", "can"),
-        _integer(address, "case", 2),
-        _integer(address, "repeat", 1),
+        address.integer("case", 2),
+        address.integer("repeat", 1),
         given.get("profile", "reference"),
-        _integer(address, "seed", 0),
-        server=_boolean(address, "server"),
+        address.integer("seed", 0),
+        server=address.choice("server", "false", "true") == "true",
         sensor=given.get("sensor", USKIN),
     )
     try:
@@ -243,17 +243,3 @@ def write(grasp: str, path: str) -> None:
     fields = json.loads(grasp)
     fields["faults"] = MagneticFaults(**fields["faults"])  # the one field that is no plain value
     save_recording(simulated(Grasp(**fields)), path)
-
-
-def _integer(address: Address, name: str, default: int) -> int:
-    text = address.parameters.get(name, str(default))
-    if not (text.isascii() and text.isdecimal()):
-        raise ValueError(f"{address.text}: {name}=1, a whole number, expected, {text!r} given")
-    return int(text)
-
-
-def _boolean(address: Address, name: str) -> bool:
-    text = address.parameters.get(name, "false")
-    if text not in ("true", "false"):
-        raise ValueError(f"{address.text}: {name}=true or false expected, {text!r} given")
-    return text == "true"

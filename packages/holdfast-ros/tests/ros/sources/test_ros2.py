@@ -148,7 +148,7 @@ def test_bad_domains(given, monkeypatch):
         ("ros2://host/xServTopic", "ros2:///TOPIC"),
         ("ros2:///", "ros2:///TOPIC"),
         ("ros2:///a?values=forces", "'forces'"),
-        ("ros2:///a?sensor=mine", "sensor=FILE.json"),
+        ("ros2:///a?sensor=mine", "'mine'; built in are"),
         ("ros2:///a?fingers=thumb", "'thumb'"),
         ("ros2:///a?master=x", "unknown parameter master"),
     ],
