@@ -1,4 +1,4 @@
-"""Print how often the grip law takes noise for a shock: in quiet holds of real sensors and the twin.
+"""Print how often the grip law takes noise for a shock, in quiet holds of sensors and the twin.
 
     python benchmarks/shocks.py DATA [--n 12] [--seed 905]
 

@@ -30,13 +30,15 @@ Its rules have no units, so that they carry over between counts and newtons:
    knocks, the arm bumps into something or the controller of the hand jerks, while a load comes
    and an object begins to slide smoothly. And a hand that presses more than it was told. After
    the blow itself, neither explains a missing load, nor a slide that the slip rule decides.
-6. Response. At the start the hand presses a little more for 0.2 s, and the law measures how long
-   the sensors take to see it: latency, lag and bus together. A slow hand keeps a reserve of force
-   in proportion to that time, because a slide runs on until the force comes.
+6. Response. When the object rests, the hand presses a little more for 0.2 s, and the law measures
+   how long the sensors take to see it: latency, lag and bus together. A slow hand keeps a reserve
+   of force in proportion to that time, because a slide runs on until the force comes.
 7. Relaxation. In a calm grip the force falls slowly, to a margin above what the load needs at the
    friction that a step has shown: T/N of the fingers that slide, or of all fingers where none is
    decided to slide. The calm grip held at its own T/N, so the friction is not much lower than
    that. It is forgotten slowly.
+8. A new grip. While a person may still hold the object, its load is not known: the hand presses
+   more, and only a finger that is decided to slide starts a step.
 
 Rule 6 and the shares of rules 1 and 2 need a slip rule; without one the law reacts to instability.
 """
@@ -46,6 +48,7 @@ from collections.abc import Sequence
 
 from holdfast_grip.command import GripReason
 from holdfast_grip.laws.base import ForceTarget, Law, Touch
+from holdfast_grip.laws.loaded_finger import LoadedFinger
 from holdfast_grip.laws.response import PROBE_RISE, HandResponse
 from holdfast_grip.laws.shocks import Shocks
 
@@ -82,8 +85,6 @@ START_TIME, START_SCALE = 1.0, 1.4
 least scale in it: people, too, press more when they take an object, until it rests."""
 LEAST_FRICTION = 0.25
 """Least coefficient of friction that a slip can show."""
-SLIDING_DOUBT = 0.7
-"""Least doubt in a finger that is decided to slide."""
 LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
 FALLING_STEP = 0.9
@@ -113,40 +114,6 @@ SQUEEZE, SQUEEZE_LOAD = 1.02, 0.97
 NEVER = -math.inf
 
 
-class _Finger:
-    """Forces and doubt of a finger."""
-
-    __slots__ = ("base", "doubt", "drag", "last", "load", "press", "rise", "share", "slides")
-
-    def __init__(self, touch: Touch) -> None:
-        self.load = touch.tangential
-        self.press = self.share = touch.normal
-        # Newest forces, not filtered, and how they changed in the last sample.
-        self.last = touch.normal, touch.tangential
-        self.rise = self.drag = 0.0
-        self.doubt, self.slides = 0.0, False
-        # Doubt of the calm grip, which says nothing about a slip.
-        self.base = 1.0 - touch.probability if touch.touching else 1.0
-
-    def follow(self, touch: Touch, part: float) -> float:
-        """Take a part of the difference to the present forces, and the present doubt.
-
-        Returns:
-            How much the change of the forces differs from that of the last sample.
-        """
-        self.load += part * (touch.tangential - self.load)
-        self.press += part * (touch.normal - self.press)
-        rise, drag = touch.normal - self.last[0], touch.tangential - self.last[1]
-        shock = abs(rise - self.rise) + abs(drag - self.drag)
-        self.last, self.rise, self.drag = (touch.normal, touch.tangential), rise, drag
-        self.slides = touch.slides
-        self.doubt = 1.0 - touch.probability if touch.touching else 1.0
-        if touch.slides:
-            sliding = SLIDING_DOUBT + (1.0 - SLIDING_DOUBT) * touch.slip_probability
-            self.doubt = max(self.doubt, sliding)
-        return shock
-
-
 class Stability(Law):
     """Law that reacts to the doubt in the hand, and follows the load.
 
@@ -166,7 +133,7 @@ class Stability(Law):
         self._margin = MARGIN + (KICK_MARGIN if has_kick else 0.0)
         self._advance_level = ADVANCE_LEVEL if knows_slips else HOLD_LEVEL
         self._advance_pause = ADVANCE_PAUSE if knows_slips else PRESS_TIME
-        self._fingers = [_Finger(touch) for touch in touches]
+        self._fingers = [LoadedFinger(touch) for touch in touches]
         self._start_force = sum(touch.start_normal for touch in touches)
         self._load = sum(finger.load for finger in self._fingers)
         self._press = sum(finger.press for finger in self._fingers)

@@ -435,7 +435,7 @@ class TestUnits:
             GripController(Limits(), sensors=sensors, newtons_per_unit=1e-3)
         GripController(Limits(), sensors=sensors)
 
-    @pytest.mark.parametrize("law", ["pr2", "friction-margin", "costanzo"])
+    @pytest.mark.parametrize("law", ["pr2", "friction-margin"])
     def test_a_law_that_needs_newtons_refuses_counts(self, law):
         with pytest.raises(ValueError, match="counts"):
             GripController(Limits(), law, sensors={"index": sensor("uskin-curved")})
