@@ -23,8 +23,7 @@ DETECTOR_RATE = 150.0
 IMPLAUSIBLE = frozenset(
     {Fault.INVALID, Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.COPIED, Fault.REZEROED}
 )
-"""Faults of readings that no skin gives. A grip does not go on with them, though the state of the
-finger may be that of its other taxels."""
+"""Faults of readings that no skin gives: a grip does not go on with the other taxels alone."""
 KEEP = FingerCommand(1.0)
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
@@ -213,8 +212,7 @@ class GripController:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
-        touches = self._start.update(estimate, time)
-        if touches:
+        if touches := self._start.update(estimate, time):
             self._begin(touches, time)
         return GripCommand(time, self.state, dict(commands))
 
