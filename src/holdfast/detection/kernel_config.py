@@ -8,7 +8,7 @@ import numpy as np
 from holdfast.contact import CAUSES, SLIP_CODE
 from holdfast.detection.heads import HEAD_NAMES, Debounce, FingerModel, Head
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec
+from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec, kinds_of
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import Structs, structs
 from holdfast.sensors import Sensor
@@ -132,8 +132,8 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
     noise_seconds = plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
     if plan.start.loaded:
         noise_seconds = LOADED_NOISE_SECONDS
-    # A second difference looks back by two lags.
-    reach = max([lag["samples"] * (1 + lag["has_seconds"]) for lag in lags], default=0)
+    samples = {lag["seconds"]: lag["samples"] for lag in lags}
+    reach = max((samples[s.seconds] * KINDS[s.kind].reach for s in specs if s.seconds), default=0)
     return {
         "n_fingers": len(features),
         "n_features": plan.width,
@@ -143,7 +143,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         if any(KINDS[spec.kind].of_components for spec in specs)
         else 1,
         "n_levels": n_levels(n_history),
-        "n_track": RING_SPARE * reach + 1,
+        "n_track": max(RING_SPARE * reach + 1, 3 if lags else 1),
         "period": 1.0 / plan.rate,
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
@@ -152,6 +152,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
         "has_ratios": any(lag["has_ratios"] for lag in lags),
+        "has_sliding": any(lag["sliding"] for lag in lags),
     }
 
 
@@ -174,6 +175,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "max_offset": OFFSET_SHARE * (high - low) * n_used * SUM_OF_WEIGHTS,
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
+        "step_noise": noise if sensor.step is None else sensor.step * COUNT_NOISE,
         "is_magnetic": bool(sensor.magnetic),
         "rests_at_zero": bool(sensor.rests_at_zero),
         # The load of the start, when it goes, may look like a field.
@@ -211,7 +213,8 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
 
 
 def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
-    families = {KINDS[spec.kind].family for spec in specs if spec.seconds == seconds}
+    kinds = {spec.kind for spec in specs if spec.seconds == seconds}
+    families = {KINDS[kind].family for kind in kinds}
     return {
         "samples": max(1, round(seconds * rate)),
         "seconds": seconds,
@@ -219,6 +222,7 @@ def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
         "has_seconds": not families.isdisjoint(("second", "mean_second")),
         "has_means": "mean_second" in families,
         "has_ratios": "ratio" in families,
+        "sliding": sum(1 << i for i, kind in enumerate(kinds_of("sliding")) if kind in kinds),
     }
 
 

@@ -177,9 +177,9 @@ enum {
     HOLDFAST_SIGMA = 5,     /* equation 2, of F_a */
     HOLDFAST_SIGMA_XYZ = 6, /* root of the sum of the squared sigmas of F_x, F_y and F_z */
     HOLDFAST_CHANGE = 7,    /* |F_tip(k) - F_tip(k - N_w + 1)| */
-    /* ... and relative ones, over a lag (motion.c). */
+    /* ... and relative ones, over a lag (motion.c, sliding.c). */
     HOLDFAST_FIRST_RELATIVE = 8,
-    HOLDFAST_N_RELATIVE = 20
+    HOLDFAST_N_RELATIVE = 56
 };
 
 /* Relative features: HOLDFAST_FIRST_RELATIVE plus one of these. */
@@ -198,9 +198,37 @@ enum {
     HF_MEAN_SECOND = 12,
     HF_SHEAR_GAIN = 17,
     HF_NORMAL_GAIN = 18,
-    HF_RATIO_GAIN = 19
+    HF_RATIO_GAIN = 19,
+    /* Those of sliding (sliding.c): of the newest sample, ... */
+    HF_FIRST_SLIDING = 20,
+    HF_FRICTION = 20,
+    HF_TAXEL_FRICTION = 21,
+    HF_FORCE_TO_NOISE = 22,
+    HF_FRICTION_MARGIN = 23,
+    /* ... changes of the force and of what is computed from it, ... */
+    HF_SHEAR_BY_LOAD = 24,
+    HF_NORMAL_BY_LOAD = 25,
+    HF_FORCE_BY_LOAD = 26,
+    HF_FRICTION_RISE = 27,
+    HF_TAXEL_FRICTION_RISE = 28,
+    HF_ALIGNMENT = 29,
+    HF_CENTRE_SHIFT = 30,
+    /* ... of the taxels, ... */
+    HF_DIVERGENCE = 31,
+    HF_RELATIVE_DIVERGENCE = 32,
+    HF_NORMAL_DIVERGENCE = 33,
+    HF_FALLING_SHARE = 34,
+    HF_RISING_SHARE = 35,
+    /* ... and five energies of fast changes: at once, and over 30, 100 and 400 ms. */
+    HF_FAST = 36
 };
-enum { HF_N_SECONDS = 5 };
+enum {
+    HF_N_SECONDS = 5,
+    HF_N_ENERGIES = 5,
+    HF_N_ENERGY_TIMES = 3,
+    HF_N_AVERAGES = 20,       /* of a lag: of second differences, then of energies */
+    HF_N_FRICTION_BLOCKS = 32 /* blocks of time of which the largest friction is kept */
+};
 
 /* What is computed from a value of a force feature. */
 enum {
@@ -266,6 +294,7 @@ typedef struct {
     hf_real max_field;      /* largest common field, see field.c; 0 where none is found, inf where
                                the unit of the readings is not known */
     hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
+    hf_real step_noise;     /* least noise of a reading in features of sliding */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */
@@ -294,6 +323,7 @@ typedef struct {
     bool has_seconds; /* some feature needs second differences, or their averages */
     bool has_means;   /* their averages */
     bool has_ratios;  /* HF_SHEAR_GAIN to HF_RATIO_GAIN */
+    uint64_t sliding; /* bit i: some feature needs HF_FIRST_SLIDING + i */
 } holdfast_lag;
 
 /* Tables: constants of a hand. Values of taxels stand in lanes: for each finger all x, then all y,
@@ -315,6 +345,7 @@ typedef struct {
     bool alike;            /* all fingers have the same features */
     bool has_centres;      /* some lag has changes: centre of pressure and moment are needed */
     bool has_ratios;       /* some lag has ratios */
+    bool has_sliding;      /* some lag has features of sliding */
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */
     const holdfast_lag *lags;         /* (n_lags), ascending */

@@ -41,6 +41,11 @@ typedef struct {
     hf_real pressure[3]; /* centre of pressure, in radii of the patch */
     hf_real moment;      /* about the normal, divided by the radius */
     hf_real ratio;       /* of tangential to normal force, beyond the reference */
+    /* With features of sliding (sliding.c): */
+    hf_real amplitude;       /* |F_tip| */
+    hf_real centre[3];       /* centre of pressure in the taxels' own frames, in radii */
+    hf_real friction;        /* of tangential to normal force */
+    hf_real taxel_friction;  /* the same of the taxels, by their share of the load */
 } holdfast_track;
 
 /* Load and noise of a finger with relative features (motion.c). */
@@ -70,6 +75,19 @@ typedef struct {
     hf_real contact_load;      /* force beyond contact_zero */
     hf_real peak_contact_load; /* the largest so far, slowly forgotten */
 } holdfast_motion;
+
+/* What features of sliding remember of a finger (sliding.c). */
+typedef struct {
+    hf_real noise;       /* s: of a reading */
+    hf_real force_noise; /* s sqrt(m) */
+    hf_real weight;      /* sum of the normal readings' sizes; not 0 */
+    hf_real load;        /* L: the same, or 10 times the noise */
+    hf_real tangent[3];  /* direction of the tangential force */
+    hf_real friction;    /* averaged over 20 ms; NaN before the first sample */
+    double block_start;  /* of the block of time [s] */
+    hf_real largest;     /* such friction of this block */
+    hf_real past[HF_N_FRICTION_BLOCKS]; /* element j: the largest of the j blocks before it */
+} holdfast_slide;
 
 /* Memory of a finger. */
 typedef struct {
@@ -133,6 +151,7 @@ typedef struct {
     uint64_t ring_age;         /* samples since the ring is followed */
     bool ring_varies;          /* enough readings and samples of the ring differ */
     holdfast_motion motion;
+    holdfast_slide slide;
     /* Readings that never changed (faults.c): last, as a living finger does not read it. */
     int64_t n_constant;   /* samples before the first that changed a reading */
     hf_real constant_sum; /* weighted sum of their readings, see hf_scan */
@@ -163,6 +182,7 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
+    HF_ARRAY(hf_real, slides, 6 * HOLDFAST_N_LANES);    /* of it, too: see sliding.c */
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */
@@ -174,9 +194,9 @@ typedef struct {
     /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
     HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
     HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
-    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
+    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_AVERAGES). */
     HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
-    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
+    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_AVERAGES);
     HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before `of_hand` */
     HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
 } holdfast_memory;

@@ -174,6 +174,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->baseline = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->reference = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
+    m->slides = (hf_real *)hf_take(block, &used, 6 * lanes, width);
     m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
     m->sums = (hf_real *)hf_take(block, &used, fingers * HF_N_RING_SUMS, width);
@@ -183,7 +184,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->track = (holdfast_track *)hf_take(block, &used, fingers * samples, sizeof *m->track);
     m->taxel_forces = (hf_real *)hf_take(block, &used, samples * 3 * lanes, width);
     m->relative = (hf_real *)hf_take(block, &used, lags * HOLDFAST_N_RELATIVE, width);
-    m->averages = (hf_real *)hf_take(block, &used, lags * HF_N_SECONDS, width);
+    m->averages = (hf_real *)hf_take(block, &used, lags * HF_N_AVERAGES, width);
     m->own = (hf_real *)hf_take(block, &used, fingers * features, width);
     m->of_hand = (hf_real *)hf_take(block, &used, features, width);
     return used;
@@ -242,7 +243,7 @@ HF_SHARED void hf_begin_finger(const hf_finger *f)
         f->hand->tare_kind == HOLDFAST_TARE_SECONDS ? HOLDFAST_TARE : HOLDFAST_WARM_UP;
     hf_fill(f->sums, HF_N_RING_SUMS, HF_NAN);
     hf_fill(f->relative, HF_N_LAGS(f->hand) * HOLDFAST_N_RELATIVE, HF_NAN);
-    hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_SECONDS, HF_NAN);
+    hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_AVERAGES, HF_NAN);
     for (size_t i = 0; i < f->n; ++i) {
         f->taxels[i].changed_at = f->used[i] > 0 ? 0 : INT64_MAX; /* never still */
     }

@@ -1,0 +1,341 @@
+/* Features of sliding: signs, ratios and shares, by which a slip differs from a press.
+ *
+ * They have no unit. Of taxel i, y_i = f_i - b_i is the reading beyond the tare in its own frame,
+ * N_i = (y_i)_z, T_i = (y_i)_xy, and w_i = |N_i| / sum |N_j| its share of the load. F is the
+ * fingertip force, F_z = F . n, F_t = F - F_z n, s the noise of a reading, m the number of taxels,
+ * and L = max(sum |N_i|, 10 s sqrt(m)). docs/details/sliding.md lists all. */
+#include "finger.h"
+
+/* Least load in a denominator: of a finger, by s sqrt(m), and of a taxel, by s. */
+#define HF_LEAST_LOAD ((hf_real)10)
+#define HF_LEAST_TAXEL_LOAD ((hf_real)5)
+/* A larger ratio of shear to normal force is that of an unloaded taxel. */
+#define HF_MAX_FRICTION ((hf_real)5)
+/* A taxel's shear falls or rises by more than this many times the noise. */
+#define HF_SHARE_NOISE ((hf_real)2)
+/* Least shift of the centre of pressure, in radii of the patch. */
+#define HF_SHIFT_FLOOR ((hf_real)1e-3)
+/* Blocks a second of which the largest friction is kept. */
+#define HF_BLOCKS_PER_SECOND 16.0
+/* Time constant of an average of the friction [s]. An average over 20 ms has the same mean delay
+ * and the same noise, and so have those of the energies of 30, 100 and 400 ms. */
+#define HF_FRICTION_SECONDS ((hf_real)0.01)
+static const hf_real HF_ENERGY_SECONDS[HF_N_ENERGY_TIMES] = {
+    (hf_real)0.015, (hf_real)0.05, (hf_real)0.2};
+
+/* Return whether one of the kinds from `first` to `last` is needed. */
+static inline bool hf_needs(uint64_t kinds, int first, int last)
+{
+    const uint64_t some = ((uint64_t)2 << (last - first)) - 1;
+    return (kinds >> (first - HF_FIRST_SLIDING) & some) != 0;
+}
+
+/* Return R_i^T v_i, with the rotations (9, n) from a lane on: the vector in the taxel's frame. */
+static inline hf_vectors hf_turned_back(const hf_real *rotations, size_t n, size_t i, hf_vectors v)
+{
+    const hf_real *const r = rotations + i;
+    const hf_vectors turned = {
+        hf_load(r) * v.x + hf_load(r + 3 * n) * v.y + hf_load(r + 6 * n) * v.z,
+        hf_load(r + n) * v.x + hf_load(r + 4 * n) * v.y + hf_load(r + 7 * n) * v.z,
+        hf_load(r + 2 * n) * v.x + hf_load(r + 5 * n) * v.y + hf_load(r + 8 * n) * v.z};
+    return turned;
+}
+
+/* Return the mean of a smoothed value after a step in time. */
+static hf_real hf_smoothed(hf_real mean, hf_real value, hf_real step, hf_real seconds)
+{
+    /* a(k) = a(k-1) + step / (step + seconds) (v(k) - a(k-1)). */
+    return isnan(mean) ? value : mean + step / (step + seconds) * (value - mean);
+}
+
+/* Sums over the taxels of a sample. */
+typedef struct {
+    hf_real load;      /* sum |N_i| */
+    hf_real centre[3]; /* sum |N_i| r_i */
+    hf_real friction;  /* sum |N_i| min(|T_i| / max(|N_i|, 5 s), 5) */
+} hf_slide_sums;
+
+/* Store y_i, |N_i|, and the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0), and add up. */
+static hf_slide_sums hf_sum_slide(const hf_finger *f, hf_real s)
+{
+    const size_t n = f->n;
+    const hf_real band = HF_SHARE_NOISE * s;
+    hf_real *const own = f->slides;
+    hf_sum load, cx, cy, cz, friction;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide p = {0}, x = {0}, y = {0}, z = {0}, ratios = {0};
+        const hf_wide none = {0};
+        const hf_wide least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors v =
+                hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
+            const hf_vectors r = hf_load_vectors(f->positions, n, i);
+            const hf_wide pressed = hf_wide_abs(v.z), shear = hf_root(v.x * v.x + v.y * v.y);
+            const hf_wide low = hf_greater(shear - band, none), high = shear + band;
+            hf_store(own + i, v.x);
+            hf_store(own + n + i, v.y);
+            hf_store(own + 2 * n + i, v.z);
+            hf_store(own + 3 * n + i, pressed);
+            hf_store(own + 4 * n + i, high * high);
+            hf_store(own + 5 * n + i, low * low);
+            p += pressed;
+            x += pressed * r.x;
+            y += pressed * r.y;
+            z += pressed * r.z;
+            ratios += pressed * hf_smaller(shear / hf_greater(pressed, least), most);
+        }
+        hf_put(&load, lane, p);
+        hf_put(&cx, lane, x);
+        hf_put(&cy, lane, y);
+        hf_put(&cz, lane, z);
+        hf_put(&friction, lane, ratios);
+    }
+    const hf_slide_sums sums = {
+        hf_total(load), {hf_total(cx), hf_total(cy), hf_total(cz)}, hf_total(friction)};
+    return sums;
+}
+
+/* Add a friction to the largest of each block of time, of which `past[j]` keeps the largest of the
+ * j blocks before this one. */
+static void hf_note_friction(holdfast_slide *m, double time)
+{
+    const double elapsed = (time - m->block_start) * HF_BLOCKS_PER_SECOND;
+    if (elapsed >= 1) {
+        const double passed = elapsed < HF_N_FRICTION_BLOCKS ? floor(elapsed) : elapsed;
+        const size_t n = passed < HF_N_FRICTION_BLOCKS ? (size_t)passed : HF_N_FRICTION_BLOCKS;
+        for (size_t j = HF_N_FRICTION_BLOCKS; j-- > n;) {
+            m->past[j] = hf_max(m->past[j - n], m->largest);
+        }
+        for (size_t j = 0; j < n; ++j) {
+            m->past[j] = 0; /* blocks without a sample */
+        }
+        m->block_start += passed / HF_BLOCKS_PER_SECOND;
+        m->largest = 0;
+    }
+    m->largest = hf_max(m->largest, m->friction);
+}
+
+/* Return the friction as a share of the largest of some seconds. */
+static hf_real hf_margin(const holdfast_slide *m, double seconds)
+{
+    /* q(k) / max q(j) over the block of the sample and those before it; 0 without shear. */
+    const double blocks = seconds * HF_BLOCKS_PER_SECOND + 0.5;
+    const size_t n = blocks < 1 ? 1 : (size_t)(blocks < HF_N_FRICTION_BLOCKS ? blocks : HF_N_FRICTION_BLOCKS);
+    return m->friction / hf_max(hf_max(m->past[n - 1], m->largest), HF_TINY);
+}
+
+HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_real step)
+{
+    holdfast_slide *const m = &f->state->slide;
+    holdfast_track *const track = &f->track[now];
+    const hf_real n_used = hf_max(f->finger->n_used, 1);
+    /* s = max(noise of all taxels / sqrt(3 m), that of the sensor's step). */
+    const hf_real of_taxel = f->state->motion.taxel_noise / hf_sqrt(3 * n_used);
+    m->noise = hf_max(of_taxel, f->finger->step_noise);
+    m->force_noise = m->noise * hf_sqrt(n_used);
+    const hf_slide_sums sums = hf_sum_slide(f, m->noise);
+    const hf_real least = HF_LEAST_LOAD * m->force_noise;
+    m->weight = hf_max(sums.load, HF_TINY);
+    m->load = hf_max(sums.load, least);
+    /* F_t / |F_t|, r = min(|F_t| / max(|F_z|, 10 s sqrt(m)), 5), and the same of the taxels by w;
+     * c = sum w_i r_i. */
+    const hf_real normal = hf_dot(track->force, f->finger->normal);
+    hf_real shear[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        shear[axis] = track->force[axis] - normal * f->finger->normal[axis];
+        track->centre[axis] = sums.centre[axis] / m->weight;
+    }
+    const hf_real size = hf_sqrt(hf_square(shear));
+    for (size_t axis = 0; axis < 3; ++axis) {
+        m->tangent[axis] = shear[axis] / hf_max(size, HF_TINY);
+    }
+    track->friction = hf_min(size / hf_max(hf_abs(normal), least), HF_MAX_FRICTION);
+    track->taxel_friction = sums.friction / m->weight;
+    track->amplitude = hf_sqrt(hf_square(track->force));
+    if (f->state->motion.n_samples == 1) {
+        hf_fill(m->past, HF_N_FRICTION_BLOCKS, 0);
+        m->friction = HF_NAN;
+        m->largest = 0;
+        m->block_start = time;
+    }
+    m->friction = hf_smoothed(m->friction, track->friction, step, HF_FRICTION_SECONDS);
+    hf_note_friction(m, time);
+}
+
+/* Sums over the changes d_i of the taxels over a lag, in their own frames. */
+typedef struct {
+    hf_real shear[2]; /* sum |N_i| dT_i */
+    hf_real squares;  /* sum |N_i| |dT_i|^2 */
+    hf_real pressed;  /* sum dN_i^2 */
+    hf_real falling;  /* sum |N_i| where |T_i| falls by more than 2 s */
+    hf_real rising;   /* the same where it rises */
+} hf_change_sums;
+
+static hf_change_sums hf_sum_changes(const hf_finger *f, size_t then)
+{
+    const size_t n = f->n;
+    const hf_real *const own = f->slides, *const ring = hf_forces_at(f, then);
+    hf_sum wx, wy, squares, pressed, falling, rising;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide x = {0}, y = {0}, tt = {0}, zz = {0}, fall = {0}, rise = {0};
+        const hf_wide none = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors old = hf_turned_back(f->rotations, n, i, hf_load_vectors(ring, n, i));
+            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), old);
+            const hf_wide w = hf_load(own + 3 * n + i), square = old.x * old.x + old.y * old.y;
+            x += w * d.x;
+            y += w * d.y;
+            tt += w * (d.x * d.x + d.y * d.y);
+            zz += d.z * d.z;
+            fall += hf_where(square > hf_load(own + 4 * n + i), w, none);
+            rise += hf_where(square < hf_load(own + 5 * n + i), w, none);
+        }
+        hf_put(&wx, lane, x);
+        hf_put(&wy, lane, y);
+        hf_put(&squares, lane, tt);
+        hf_put(&pressed, lane, zz);
+        hf_put(&falling, lane, fall);
+        hf_put(&rising, lane, rise);
+    }
+    const hf_change_sums sums = {
+        {hf_total(wx), hf_total(wy)}, hf_total(squares), hf_total(pressed), hf_total(falling),
+        hf_total(rising)};
+    return sums;
+}
+
+/* Fill what compares the taxels over a lag. */
+static void hf_fill_spread(const hf_finger *f, uint64_t kinds, size_t then, hf_real *out)
+{
+    const holdfast_slide *const m = &f->state->slide;
+    const hf_change_sums sums = hf_sum_changes(f, then);
+    const hf_real share = 1 / m->weight, by_load = hf_max(f->finger->n_used, 1) / m->load;
+    if (hf_needs(kinds, HF_DIVERGENCE, HF_RELATIVE_DIVERGENCE)) {
+        /* u = sum w_i dT_i, v = sqrt(sum w_i |dT_i|^2 - |u|^2): log((v + s) m / L) and
+         * log((v + s) / (|u| + s)). */
+        const hf_real x = share * sums.shear[0], y = share * sums.shear[1];
+        const hf_real square = x * x + y * y;
+        const hf_real spread = hf_sqrt(hf_max(share * sums.squares - square, 0)) + m->noise;
+        out[HF_DIVERGENCE] = hf_log(spread * by_load);
+        out[HF_RELATIVE_DIVERGENCE] = hf_log(spread / (hf_sqrt(square) + m->noise));
+    }
+    if (hf_needs(kinds, HF_NORMAL_DIVERGENCE, HF_NORMAL_DIVERGENCE)) {
+        /* log((sqrt(sum dN_i^2 / m) + s) m / L). */
+        const hf_real mean = sums.pressed / hf_max(f->finger->n_used, 1);
+        out[HF_NORMAL_DIVERGENCE] = hf_log((hf_sqrt(mean) + m->noise) * by_load);
+    }
+    /* sum w_i over the taxels with d|T_i| < -2 s, and with d|T_i| > 2 s. */
+    out[HF_FALLING_SHARE] = share * sums.falling;
+    out[HF_RISING_SHARE] = share * sums.rising;
+}
+
+/* Fill the changes of the force, of its friction and of the centre of pressure over a lag. */
+static void hf_fill_steps(
+    const hf_finger *f, uint64_t kinds, const holdfast_track *now, const holdfast_track *then,
+    hf_real *out)
+{
+    const holdfast_slide *const m = &f->state->slide;
+    const hf_real share = 1 / m->load;
+    hf_real change[3], shift[3];
+    for (size_t axis = 0; axis < 3; ++axis) {
+        change[axis] = now->force[axis] - then->force[axis];
+        shift[axis] = now->centre[axis] - then->centre[axis];
+    }
+    const hf_real across = hf_dot(change, f->finger->normal);
+    if (hf_needs(kinds, HF_SHEAR_BY_LOAD, HF_SHEAR_BY_LOAD)) {
+        /* log((|dF_t| + s sqrt(m)) / L). */
+        const hf_real square = hf_max(hf_square(change) - across * across, 0);
+        out[HF_SHEAR_BY_LOAD] = hf_log((hf_sqrt(square) + m->force_noise) * share);
+    }
+    if (hf_needs(kinds, HF_CENTRE_SHIFT, HF_CENTRE_SHIFT)) {
+        out[HF_CENTRE_SHIFT] = hf_log(hf_sqrt(hf_square(shift)) + HF_SHIFT_FLOOR); /* log |dc| */
+    }
+    /* dF_z / L, d|F| / L, dr, that of the taxels, and dF_t . F_t / (|F_t| L). */
+    out[HF_NORMAL_BY_LOAD] = across * share;
+    out[HF_FORCE_BY_LOAD] = (now->amplitude - then->amplitude) * share;
+    out[HF_FRICTION_RISE] = now->friction - then->friction;
+    out[HF_TAXEL_FRICTION_RISE] = now->taxel_friction - then->taxel_friction;
+    out[HF_ALIGNMENT] = hf_dot(change, m->tangent) * share;
+}
+
+/* Fill the sums over the fast changes of the taxels, divided by their number: of first differences
+ * of T, and of second differences of T, of N, of both, and of T about its mean. */
+static void hf_sum_fast(const hf_finger *f, hf_second at, hf_real energies[HF_N_ENERGIES])
+{
+    const size_t n = f->n;
+    const hf_real *const own = f->slides;
+    const hf_real *const mid = hf_forces_at(f, at.before), *const old = hf_forces_at(f, at.first);
+    const hf_real a = at.newest, c = at.oldest;
+    hf_sum first, shear, normal, mx, my;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide once = {0}, tt = {0}, zz = {0}, x = {0}, y = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_vectors middle = hf_load_vectors(mid, n, i);
+            const hf_vectors before = hf_turned_back(f->rotations, n, i, middle);
+            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), before);
+            const hf_vectors e = hf_turned_back(
+                f->rotations, n, i, hf_minus(middle, hf_load_vectors(old, n, i)));
+            /* a y(k) - 2 y(k-s) + c y(k-2s), as a + c = 2. */
+            const hf_vectors second = {a * d.x - c * e.x, a * d.y - c * e.y, a * d.z - c * e.z};
+            once += d.x * d.x + d.y * d.y;
+            tt += second.x * second.x + second.y * second.y;
+            zz += second.z * second.z;
+            x += second.x;
+            y += second.y;
+        }
+        hf_put(&first, lane, once);
+        hf_put(&shear, lane, tt);
+        hf_put(&normal, lane, zz);
+        hf_put(&mx, lane, x);
+        hf_put(&my, lane, y);
+    }
+    const hf_real share = 1 / hf_max(f->finger->n_used, 1);
+    const hf_real mean[2] = {share * hf_total(mx), share * hf_total(my)};
+    energies[0] = share * hf_total(first);
+    energies[1] = share * hf_total(shear);
+    energies[2] = share * hf_total(normal);
+    energies[3] = energies[1] + energies[2];
+    energies[4] = hf_max(energies[1] - (mean[0] * mean[0] + mean[1] * mean[1]), 0);
+}
+
+/* Fill the energies of the fast changes, and their averages. */
+HF_SHARED void hf_fill_energies(
+    const hf_finger *f, uint64_t kinds, hf_second at, hf_real step, hf_real *averages,
+    hf_real *out)
+{
+    hf_real energies[HF_N_ENERGIES];
+    hf_sum_fast(f, at, energies);
+    const hf_real share = 1 / (f->state->slide.noise * f->state->slide.noise);
+    for (int j = 0; j <= HF_N_ENERGY_TIMES; ++j) {
+        for (int i = 0; i < HF_N_ENERGIES; ++i) {
+            const int kind = HF_FAST + j * HF_N_ENERGIES + i;
+            if (hf_needs(kinds, kind, kind)) {
+                hf_real *const mean = j > 0 ? &averages[(j - 1) * HF_N_ENERGIES + i] : &energies[i];
+                if (j > 0) {
+                    *mean = hf_smoothed(*mean, energies[i], step, HF_ENERGY_SECONDS[j - 1]);
+                }
+                out[kind] = hf_log(1 + share * *mean) / 2; /* log sqrt(1 + v^2 / s^2) */
+            }
+        }
+    }
+}
+
+HF_SHARED void hf_fill_slide(
+    const hf_finger *f, const holdfast_lag *lag, size_t now, size_t then, hf_real *out)
+{
+    const holdfast_slide *const m = &f->state->slide;
+    const uint64_t kinds = lag->sliding;
+    out[HF_FRICTION] = f->track[now].friction;
+    out[HF_TAXEL_FRICTION] = f->track[now].taxel_friction;
+    if (hf_needs(kinds, HF_FORCE_TO_NOISE, HF_FORCE_TO_NOISE)) {
+        out[HF_FORCE_TO_NOISE] = hf_log(1 + f->track[now].amplitude / m->force_noise);
+    }
+    if (hf_needs(kinds, HF_FRICTION_MARGIN, HF_FRICTION_MARGIN)) {
+        out[HF_FRICTION_MARGIN] = hf_margin(m, lag->seconds);
+    }
+    if (hf_needs(kinds, HF_SHEAR_BY_LOAD, HF_CENTRE_SHIFT)) {
+        hf_fill_steps(f, kinds, &f->track[now], &f->track[then], out);
+    }
+    if (hf_needs(kinds, HF_DIVERGENCE, HF_RISING_SHARE)) {
+        hf_fill_spread(f, kinds, then, out);
+    }
+}
