@@ -134,6 +134,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         noise_seconds = LOADED_NOISE_SECONDS
     samples = {lag["seconds"]: lag["samples"] for lag in lags}
     reach = max((samples[s.seconds] * KINDS[s.kind].reach for s in specs if s.seconds), default=0)
+    n_track = max(RING_SPARE * reach + 1, 3 if lags else 1)
     return {
         "n_fingers": len(features),
         "n_features": plan.width,
@@ -143,7 +144,8 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         if any(KINDS[spec.kind].of_components for spec in specs)
         else 1,
         "n_levels": n_levels(n_history),
-        "n_track": max(RING_SPARE * reach + 1, 3 if lags else 1),
+        "n_track": n_track,
+        "n_slides": n_track if any(lag["sliding"] for lag in lags) else 0,
         "period": 1.0 / plan.rate,
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
@@ -152,7 +154,6 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
         "has_ratios": any(lag["has_ratios"] for lag in lags),
-        "has_sliding": any(lag["sliding"] for lag in lags),
     }
 
 

@@ -51,7 +51,7 @@ typedef struct {
     hf_real *reference;
     hf_real *changes;
     hf_real *pressed; /* (n) */
-    hf_real *slides;  /* (6, n) */
+    hf_real *shares;  /* (3, n) */
     hf_real *powers;  /* (2, n) */
     holdfast_taxel *taxels;
     holdfast_mask *masks;
@@ -61,6 +61,7 @@ typedef struct {
     hf_real *blocks;
     holdfast_track *track;
     hf_real *taxel_forces; /* of the first sample in the ring */
+    hf_real *slides;       /* likewise */
     hf_real *relative;
     hf_real *averages;
 } hf_finger;

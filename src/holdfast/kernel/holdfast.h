@@ -107,6 +107,7 @@ typedef double hf_real;
 #define HF_N_CHANNELS(hand) ((void)(hand), (size_t)HOLDFAST_N_CHANNELS)
 #define HF_N_LEVELS(hand) ((void)(hand), (size_t)HOLDFAST_N_LEVELS)
 #define HF_N_TRACK(hand) ((void)(hand), (size_t)HOLDFAST_N_TRACK)
+#define HF_N_SLIDES(hand) ((void)(hand), (size_t)HOLDFAST_N_SLIDES)
 #define HF_ARRAY(type, name, length) type name[length]
 #else
 #define HF_N_FINGERS(hand) ((hand)->n_fingers)
@@ -117,6 +118,7 @@ typedef double hf_real;
 #define HF_N_CHANNELS(hand) ((hand)->n_channels)
 #define HF_N_LEVELS(hand) ((hand)->n_levels)
 #define HF_N_TRACK(hand) ((hand)->n_track)
+#define HF_N_SLIDES(hand) ((hand)->n_slides)
 #define HF_ARRAY(type, name, length) type *name
 #endif
 
@@ -337,6 +339,7 @@ typedef struct {
     size_t n_channels; /* with Haar windows: 1 (F_a), or 4 (its components too) */
     size_t n_levels;   /* sizes of blocks in the longest window, see window.c */
     size_t n_track;    /* samples of the ring of relative features; at least 1 */
+    size_t n_slides;   /* of that of features of sliding: as many, or 0 without such features */
     hf_real period;    /* of the samples [s] */
     int32_t tare_kind;
     hf_real tare_seconds;
@@ -345,7 +348,6 @@ typedef struct {
     bool alike;            /* all fingers have the same features */
     bool has_centres;      /* some lag has changes: centre of pressure and moment are needed */
     bool has_ratios;       /* some lag has ratios */
-    bool has_sliding;      /* some lag has features of sliding */
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */
     const holdfast_lag *lags;         /* (n_lags), ascending */

@@ -182,7 +182,7 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
-    HF_ARRAY(hf_real, slides, 6 * HOLDFAST_N_LANES);    /* of it, too: see sliding.c */
+    HF_ARRAY(hf_real, shares, 3 * HOLDFAST_N_LANES);    /* likewise, see sliding.c */
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */
@@ -194,6 +194,8 @@ typedef struct {
     /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
     HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
     HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
+    /* (n_slides, 3 n_lanes): the same in the taxels' own frames, a ring. */
+    HF_ARRAY(hf_real, slides, (HOLDFAST_N_SLIDES + 1) * 3 * HOLDFAST_N_LANES);
     /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_AVERAGES). */
     HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
     HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_AVERAGES);

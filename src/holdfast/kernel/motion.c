@@ -418,7 +418,7 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     if (hand->has_ratios) {
         hf_update_ratio(f, now);
     }
-    if (hand->has_sliding) {
+    if (HF_N_SLIDES(hand) > 0) {
         hf_append_slide(f, now, time, step);
     }
     if (n < 2) {

@@ -30,15 +30,10 @@ static inline bool hf_needs(uint64_t kinds, int first, int last)
     return (kinds >> (first - HF_FIRST_SLIDING) & some) != 0;
 }
 
-/* Return R_i^T v_i, with the rotations (9, n) from a lane on: the vector in the taxel's frame. */
-static inline hf_vectors hf_turned_back(const hf_real *rotations, size_t n, size_t i, hf_vectors v)
+/* Return y_i (3, n) of a sample in the ring. */
+static inline hf_real *hf_slide_at(const hf_finger *f, size_t index)
 {
-    const hf_real *const r = rotations + i;
-    const hf_vectors turned = {
-        hf_load(r) * v.x + hf_load(r + 3 * n) * v.y + hf_load(r + 6 * n) * v.z,
-        hf_load(r + n) * v.x + hf_load(r + 4 * n) * v.y + hf_load(r + 7 * n) * v.z,
-        hf_load(r + 2 * n) * v.x + hf_load(r + 5 * n) * v.y + hf_load(r + 8 * n) * v.z};
-    return turned;
+    return f->slides + index * 3 * HF_N_LANES(f->hand);
 }
 
 /* Return the mean of a smoothed value after a step in time. */
@@ -56,11 +51,11 @@ typedef struct {
 } hf_slide_sums;
 
 /* Store y_i, |N_i|, and the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0), and add up. */
-static hf_slide_sums hf_sum_slide(const hf_finger *f, hf_real s)
+static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
 {
     const size_t n = f->n;
     const hf_real band = HF_SHARE_NOISE * s;
-    hf_real *const own = f->slides;
+    hf_real *const own = hf_slide_at(f, now), *const shares = f->shares;
     hf_sum load, cx, cy, cz, friction;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide p = {0}, x = {0}, y = {0}, z = {0}, ratios = {0};
@@ -75,9 +70,9 @@ static hf_slide_sums hf_sum_slide(const hf_finger *f, hf_real s)
             hf_store(own + i, v.x);
             hf_store(own + n + i, v.y);
             hf_store(own + 2 * n + i, v.z);
-            hf_store(own + 3 * n + i, pressed);
-            hf_store(own + 4 * n + i, high * high);
-            hf_store(own + 5 * n + i, low * low);
+            hf_store(shares + i, pressed);
+            hf_store(shares + n + i, high * high);
+            hf_store(shares + 2 * n + i, low * low);
             p += pressed;
             x += pressed * r.x;
             y += pressed * r.y;
@@ -133,7 +128,7 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     const hf_real of_taxel = f->state->motion.taxel_noise / hf_sqrt(3 * n_used);
     m->noise = hf_max(of_taxel, f->finger->step_noise);
     m->force_noise = m->noise * hf_sqrt(n_used);
-    const hf_slide_sums sums = hf_sum_slide(f, m->noise);
+    const hf_slide_sums sums = hf_sum_slide(f, now, m->noise);
     const hf_real least = HF_LEAST_LOAD * m->force_noise;
     m->weight = hf_max(sums.load, HF_TINY);
     m->load = hf_max(sums.load, least);
@@ -162,70 +157,105 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     hf_note_friction(m, time);
 }
 
-/* Sums over the changes d_i of the taxels over a lag, in their own frames. */
+/* Sums over the changes of the taxels' shear over a lag. */
 typedef struct {
-    hf_real shear[2]; /* sum |N_i| dT_i */
-    hf_real squares;  /* sum |N_i| |dT_i|^2 */
-    hf_real pressed;  /* sum dN_i^2 */
-    hf_real falling;  /* sum |N_i| where |T_i| falls by more than 2 s */
-    hf_real rising;   /* the same where it rises */
-} hf_change_sums;
+    hf_real mean[2]; /* sum |N_i| dT_i */
+    hf_real squares; /* sum |N_i| |dT_i|^2 */
+} hf_shear_sums;
 
-static hf_change_sums hf_sum_changes(const hf_finger *f, size_t then)
+static hf_shear_sums hf_sum_shear(const hf_finger *f, size_t now, size_t then)
 {
     const size_t n = f->n;
-    const hf_real *const own = f->slides, *const ring = hf_forces_at(f, then);
-    hf_sum wx, wy, squares, pressed, falling, rising;
+    const hf_real *const own = hf_slide_at(f, now), *const old = hf_slide_at(f, then);
+    hf_sum wx, wy, squares;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide x = {0}, y = {0}, tt = {0}, zz = {0}, fall = {0}, rise = {0};
-        const hf_wide none = {0};
+        hf_wide x = {0}, y = {0}, square = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
-            const hf_vectors old = hf_turned_back(f->rotations, n, i, hf_load_vectors(ring, n, i));
-            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), old);
-            const hf_wide w = hf_load(own + 3 * n + i), square = old.x * old.x + old.y * old.y;
-            x += w * d.x;
-            y += w * d.y;
-            tt += w * (d.x * d.x + d.y * d.y);
-            zz += d.z * d.z;
-            fall += hf_where(square > hf_load(own + 4 * n + i), w, none);
-            rise += hf_where(square < hf_load(own + 5 * n + i), w, none);
+            const hf_wide dx = hf_load(own + i) - hf_load(old + i);
+            const hf_wide dy = hf_load(own + n + i) - hf_load(old + n + i);
+            const hf_wide wide_x = hf_load(f->shares + i) * dx, wide_y = hf_load(f->shares + i) * dy;
+            x += wide_x;
+            y += wide_y;
+            square += wide_x * dx + wide_y * dy;
         }
         hf_put(&wx, lane, x);
         hf_put(&wy, lane, y);
-        hf_put(&squares, lane, tt);
-        hf_put(&pressed, lane, zz);
-        hf_put(&falling, lane, fall);
-        hf_put(&rising, lane, rise);
+        hf_put(&squares, lane, square);
     }
-    const hf_change_sums sums = {
-        {hf_total(wx), hf_total(wy)}, hf_total(squares), hf_total(pressed), hf_total(falling),
-        hf_total(rising)};
+    const hf_shear_sums sums = {{hf_total(wx), hf_total(wy)}, hf_total(squares)};
     return sums;
 }
 
+/* Return sum dN_i^2. */
+static hf_real hf_sum_pressed(const hf_finger *f, size_t now, size_t then)
+{
+    const hf_real *const own = hf_slide_at(f, now) + 2 * f->n;
+    const hf_real *const old = hf_slide_at(f, then) + 2 * f->n;
+    hf_sum squares;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide part = {0};
+        for (size_t i = lane; i < f->n; i += HF_LANES) {
+            const hf_wide d = hf_load(own + i) - hf_load(old + i);
+            part += d * d;
+        }
+        hf_put(&squares, lane, part);
+    }
+    return hf_total(squares);
+}
+
+/* Compute sum |N_i| over the taxels with d|T_i| < -2 s, and over those with d|T_i| > 2 s. */
+static void hf_sum_shares(const hf_finger *f, size_t then, hf_real *falling, hf_real *rising)
+{
+    const size_t n = f->n;
+    const hf_real *const old = hf_slide_at(f, then), *const shares = f->shares;
+    hf_sum falls, rises;
+    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
+        hf_wide fall = {0}, rise = {0};
+        const hf_wide none = {0};
+        for (size_t i = lane; i < n; i += HF_LANES) {
+            const hf_wide x = hf_load(old + i), y = hf_load(old + n + i), w = hf_load(shares + i);
+            const hf_wide square = x * x + y * y;
+            fall += hf_where(square > hf_load(shares + n + i), w, none);
+            rise += hf_where(square < hf_load(shares + 2 * n + i), w, none);
+        }
+        hf_put(&falls, lane, fall);
+        hf_put(&rises, lane, rise);
+    }
+    *falling = hf_total(falls);
+    *rising = hf_total(rises);
+}
+
 /* Fill what compares the taxels over a lag. */
-static void hf_fill_spread(const hf_finger *f, uint64_t kinds, size_t then, hf_real *out)
+static void hf_fill_spread(
+    const hf_finger *f, uint64_t kinds, size_t now, size_t then, hf_real *out)
 {
     const holdfast_slide *const m = &f->state->slide;
-    const hf_change_sums sums = hf_sum_changes(f, then);
-    const hf_real share = 1 / m->weight, by_load = hf_max(f->finger->n_used, 1) / m->load;
+    const hf_real n_used = hf_max(f->finger->n_used, 1), by_load = n_used / m->load;
+    const hf_real share = 1 / m->weight;
     if (hf_needs(kinds, HF_DIVERGENCE, HF_RELATIVE_DIVERGENCE)) {
         /* u = sum w_i dT_i, v = sqrt(sum w_i |dT_i|^2 - |u|^2): log((v + s) m / L) and
          * log((v + s) / (|u| + s)). */
-        const hf_real x = share * sums.shear[0], y = share * sums.shear[1];
+        const hf_shear_sums sums = hf_sum_shear(f, now, then);
+        const hf_real x = share * sums.mean[0], y = share * sums.mean[1];
         const hf_real square = x * x + y * y;
         const hf_real spread = hf_sqrt(hf_max(share * sums.squares - square, 0)) + m->noise;
-        out[HF_DIVERGENCE] = hf_log(spread * by_load);
-        out[HF_RELATIVE_DIVERGENCE] = hf_log(spread / (hf_sqrt(square) + m->noise));
+        if (hf_needs(kinds, HF_DIVERGENCE, HF_DIVERGENCE)) {
+            out[HF_DIVERGENCE] = hf_log(spread * by_load);
+        }
+        if (hf_needs(kinds, HF_RELATIVE_DIVERGENCE, HF_RELATIVE_DIVERGENCE)) {
+            out[HF_RELATIVE_DIVERGENCE] = hf_log(spread / (hf_sqrt(square) + m->noise));
+        }
     }
     if (hf_needs(kinds, HF_NORMAL_DIVERGENCE, HF_NORMAL_DIVERGENCE)) {
         /* log((sqrt(sum dN_i^2 / m) + s) m / L). */
-        const hf_real mean = sums.pressed / hf_max(f->finger->n_used, 1);
-        out[HF_NORMAL_DIVERGENCE] = hf_log((hf_sqrt(mean) + m->noise) * by_load);
+        const hf_real change = hf_sqrt(hf_sum_pressed(f, now, then) / n_used);
+        out[HF_NORMAL_DIVERGENCE] = hf_log((change + m->noise) * by_load);
     }
-    /* sum w_i over the taxels with d|T_i| < -2 s, and with d|T_i| > 2 s. */
-    out[HF_FALLING_SHARE] = share * sums.falling;
-    out[HF_RISING_SHARE] = share * sums.rising;
+    if (hf_needs(kinds, HF_FALLING_SHARE, HF_RISING_SHARE)) {
+        hf_sum_shares(f, then, &out[HF_FALLING_SHARE], &out[HF_RISING_SHARE]);
+        out[HF_FALLING_SHARE] *= share;
+        out[HF_RISING_SHARE] *= share;
+    }
 }
 
 /* Fill the changes of the force, of its friction and of the centre of pressure over a lag. */
@@ -262,18 +292,16 @@ static void hf_fill_steps(
 static void hf_sum_fast(const hf_finger *f, hf_second at, hf_real energies[HF_N_ENERGIES])
 {
     const size_t n = f->n;
-    const hf_real *const own = f->slides;
-    const hf_real *const mid = hf_forces_at(f, at.before), *const old = hf_forces_at(f, at.first);
+    const hf_real *const own = hf_slide_at(f, at.now), *const mid = hf_slide_at(f, at.before);
+    const hf_real *const old = hf_slide_at(f, at.first);
     const hf_real a = at.newest, c = at.oldest;
     hf_sum first, shear, normal, mx, my;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide once = {0}, tt = {0}, zz = {0}, x = {0}, y = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_vectors middle = hf_load_vectors(mid, n, i);
-            const hf_vectors before = hf_turned_back(f->rotations, n, i, middle);
-            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), before);
-            const hf_vectors e = hf_turned_back(
-                f->rotations, n, i, hf_minus(middle, hf_load_vectors(old, n, i)));
+            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), middle);
+            const hf_vectors e = hf_minus(middle, hf_load_vectors(old, n, i));
             /* a y(k) - 2 y(k-s) + c y(k-2s), as a + c = 2. */
             const hf_vectors second = {a * d.x - c * e.x, a * d.y - c * e.y, a * d.z - c * e.z};
             once += d.x * d.x + d.y * d.y;
@@ -336,6 +364,6 @@ HF_SHARED void hf_fill_slide(
         hf_fill_steps(f, kinds, &f->track[now], &f->track[then], out);
     }
     if (hf_needs(kinds, HF_DIVERGENCE, HF_RISING_SHARE)) {
-        hf_fill_spread(f, kinds, then, out);
+        hf_fill_spread(f, kinds, now, then, out);
     }
 }

@@ -1,0 +1,223 @@
+"""The features of sliding against slow NumPy over whole arrays, and their laws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from holdfast.detection import Tare
+from holdfast.detection.features import extract
+from holdfast.detection.plan import StreamPlan
+from holdfast.detection.specs import (
+    SLIDING_CHOICE,
+    SLIDING_FEATURES,
+    SLIDING_LAGS,
+    ZERO_KINDS,
+    FeatureSpec,
+)
+from holdfast.recordings import Recording, Tactile
+from holdfast.sensors import Sensor
+from holdfast.sensors import sensor as built_in
+
+RATE = 75.0
+AVERAGES = {"30ms": 0.015, "100ms": 0.05, "400ms": 0.2}
+
+
+def features_of(readings, times, sensor, rate=RATE, specs=SLIDING_FEATURES):
+    plan = StreamPlan({"a": sensor}, {"a": specs}, 14, Tare.parse("first"), rate)
+    module = Tactile(sensor, times, readings)
+    return extract(plan, Recording("made", {"a": module}))["a"].features
+
+
+def naive(readings, times, sensor, rate=RATE):
+    """(n, 97) from the definitions: a stretch between gaps at a time, all its samples at once."""
+    readings = readings.astype(float)
+    changed = np.append(False, (np.diff(readings, axis=0) != 0).any(axis=(1, 2)))
+    gaps = np.flatnonzero(np.diff(times) > max(3.0003 / rate, 0.10001)) + 1
+    rows, least, own = np.full((len(times), len(SLIDING_FEATURES)), np.nan), np.inf, readings - readings[0]
+    for stretch in np.split(np.arange(len(times)), gaps):
+        noise, least = noise_of(own[stretch], times[stretch], changed[stretch], sensor, rate, least)
+        if len(stretch) < 2:
+            continue
+        values = of_stretch(own[stretch], times[stretch], noise, sensor, rate)
+        for j, spec in enumerate(SLIDING_FEATURES):
+            rows[stretch[1:], j] = values[spec.kind, spec.seconds][1:]
+    return rows
+
+
+def noise_of(own, times, changed, sensor, rate, least):
+    """(n,) noise of a reading: the least mean square step over blocks of 0.2 s so far."""
+    floor = sensor.step or (1.0 if sensor.unit == "count" else 1e-6 * np.sqrt(12))
+    floor_of_units = 1.0 if sensor.unit == "count" else 1e-6 * np.sqrt(12)
+    now, block, began, found = floor_of_units / np.sqrt(12), [], times[0], []
+    for k, time in enumerate(times):
+        if k and changed[k] and time - times[k - 1] <= 3.0003 / rate:
+            block.append(((own[k] - own[k - 1]) ** 2).mean() / 2)
+        if block:
+            now = max(np.sqrt(np.mean(block)), floor_of_units / np.sqrt(12))
+            if time - began >= 0.2 and len(block) >= 5:
+                least, block, began = min(least, now), [], time
+        found.append(max(now if np.isinf(least) else least, floor / np.sqrt(12)))
+    return np.array(found), least
+
+
+def before(times, when, samples):
+    """(n,) the sample nearest to a time before each; of two equals that of even times."""
+    found = np.zeros(len(times), dtype=int)
+    for k in range(1, len(times)):
+        near = np.abs(times[:k] - when[k])
+        best = int(near.argmin())
+        for other in (best - 1, best + 1):
+            if 0 <= other < k and near[other] - near[best] <= 0.02 * abs(times[other] - times[best]):
+                likely = k - min(max(1, round(samples)), k)
+                best = min(max(likely, min(best, other)), max(best, other))
+        found[k] = best
+    return found
+
+
+def smoothed(values, times, rate, seconds):
+    means = [values[0]]
+    for value, step in zip(values[1:], np.diff(times), strict=True):
+        means.append(means[-1] + step / (step + seconds) * (value - means[-1]))
+    return np.array(means)
+
+
+def of_stretch(own, times, s, sensor, rate):
+    """Return each kind and lag: (n,)."""
+    n, m = own.shape[:2]
+    norm = lambda vectors: np.sqrt((vectors**2).sum(axis=-1))  # noqa: E731
+    places = sensor.positions - sensor.positions.mean(axis=0)
+    places = places / (np.sqrt((places**2).sum(axis=1).mean()) or 1.0)
+    sheared, pressed = own[..., :2], np.abs(own[..., 2])
+    load = pressed.sum(axis=1)
+    w = pressed / np.maximum(load, 1e-300)[:, None]
+    force = np.einsum("nij,tnj->ti", sensor.rotations, own)
+    along = force @ sensor.normal
+    across = force - along[:, None] * sensor.normal
+    tangent = across / np.maximum(norm(across), 1e-300)[:, None]
+    whole = s * np.sqrt(m)
+    by_load = np.maximum(load, 10 * whole)
+    r = np.minimum(norm(across) / np.maximum(np.abs(along), 10 * whole), 5)
+    ratios = np.minimum(norm(sheared) / np.maximum(pressed, 5 * s[:, None]), 5)
+    q, centre = (w * ratios).sum(axis=1), w @ places
+    values = {
+        ("friction", 0.014): r, ("taxel_friction", 0.014): q,
+        ("force_to_noise", 0.014): np.log1p(norm(force) / whole),
+    }  # fmt: skip
+    mean = smoothed(r, times, rate, 0.01)
+    blocks = np.floor((times - times[0]) * 16)
+    for seconds in (0.5, 2.0):
+        inside = (blocks[:, None] - blocks < 16 * seconds) & (np.arange(n) <= np.arange(n)[:, None])
+        most = np.where(inside, mean, 0).max(axis=1)
+        values["friction_margin", seconds] = mean / np.maximum(most, 1e-300)
+    for lag in SLIDING_LAGS:
+        then = before(times, times - lag, lag * rate)
+        d, change, shear = own - own[then], force - force[then], sheared - sheared[then]
+        change_across = change - (change @ sensor.normal)[:, None] * sensor.normal
+        common = (w[..., None] * shear).sum(axis=1)
+        spread = np.sqrt((w * norm(shear - common[:, None]) ** 2).sum(axis=1))
+        turned = norm(sheared) - norm(sheared[then])
+        values |= {
+            ("shear_by_load", lag): np.log((norm(change_across) + whole) / by_load),
+            ("normal_by_load", lag): change @ sensor.normal / by_load,
+            ("force_by_load", lag): (norm(force) - norm(force[then])) / by_load,
+            ("friction_rise", lag): r - r[then],
+            ("taxel_friction_rise", lag): q - q[then],
+            ("alignment", lag): (change_across * tangent).sum(axis=1) / by_load,
+            ("centre_shift", lag): np.log(norm(centre - centre[then]) + 1e-3),
+            ("divergence", lag): np.log((spread + s) * m / by_load),
+            ("relative_divergence", lag): np.log((spread + s) / (norm(common) + s)),
+            ("normal_divergence", lag): np.log(
+                (np.sqrt((d[..., 2] ** 2).mean(axis=1)) + s) * m / by_load
+            ),
+            ("falling_share", lag): (w * (turned < -2 * s[:, None])).sum(axis=1),
+            ("rising_share", lag): (w * (turned > 2 * s[:, None])).sum(axis=1),
+        }
+    for what, energy in energies(own, times, rate).items():
+        values[f"fast_{what}", 0.014] = np.log1p(energy / s**2) / 2
+        for over, seconds in AVERAGES.items():
+            # The first sample has no difference: the average begins at the second.
+            mean = np.append(0, smoothed(energy[1:], times[1:], rate, seconds))
+            values[f"fast_{what}_{over}", 0.014] = np.log1p(mean / s**2) / 2
+    return values
+
+
+def energies(own, times, rate):
+    """Return the mean squares of the first and second differences of the taxels."""
+    steps, seconds = np.zeros_like(own), np.zeros_like(own)
+    near = before(times, times - 0.014, 0.014 * rate)
+    for k in range(2, len(own)):
+        middle = near[k]
+        if times[0] > 2 * times[middle] - times[k] + (times[k] - times[middle]) / 2 / (k - middle):
+            middle = k - min(k - middle, k // 2)
+        when = np.full(k + 1, 2 * times[middle] - times[k])
+        oldest = min(before(times[: k + 1], when, 2 * (k - middle))[k], middle - 1)
+        later, earlier = times[k] - times[middle], times[middle] - times[oldest]
+        even = abs(later - earlier) <= 0.02 * (later + earlier)
+        a = 1.0 if even else 2 * earlier / (later + earlier)
+        steps[k] = own[k] - own[middle]
+        seconds[k] = a * own[k] - 2 * own[middle] + (2 - a) * own[oldest]
+    squares = lambda x: (x**2).sum(axis=-1).mean(axis=-1)  # noqa: E731
+    shear, normal = seconds[..., :2], seconds[..., 2:]
+    return {
+        "step": squares(steps[..., :2]), "shear": squares(shear), "normal": squares(normal),
+        "all": squares(seconds), "own": squares(shear - shear.mean(axis=1, keepdims=True)),
+    }  # fmt: skip
+
+
+def made(name):
+    """Return a sensor without a field of the earth in its readings."""
+    if name == "quantised":  # in newtons, by steps, exactly 0 without contact
+        return replace(built_in("uskin-4x4"), name=name, unit="N", range=(-100.0, 100.0), step=0.01,
+                       magnetic=False, rests_at_zero=True)  # fmt: skip
+    if name == "one":
+        return Sensor(name, np.zeros((1, 3)), np.eye(3)[None], np.array([0, 0, 1.0]), 100.0, "N")
+    return replace(built_in(name), magnetic=False)
+
+
+def walk(sensor, seed, n=400, rate=RATE, uneven=0.0, gaps=()):
+    """Return readings that rest, are pressed and move, and their times."""
+    rng = np.random.default_rng(seed)
+    steps = 1 + uneven * rng.uniform(-1, 1, n)
+    for k, periods in gaps:
+        steps[k] = periods
+    shape = (n, sensor.n_taxels, 3)
+    load = np.clip((np.arange(n) - 60) / 30, 0, 1) * (np.arange(n) < n - 40)
+    moving = np.cumsum(rng.normal(size=shape), axis=0) * 0.02
+    force = load[:, None, None] * ([0, 0, 1] + rng.random((sensor.n_taxels, 3)) + moving)
+    noise = rng.normal(size=shape) * 0.003
+    times = 3.0 + np.cumsum(steps) / rate
+    if sensor.unit == "count":
+        return np.rint(32000 + 300 * (force + noise)), times
+    if sensor.step:
+        return np.rint(100 * force) / 100, times
+    return force + noise, times
+
+
+SENSORS = ("uskin-4x4", "uskin-curved", "papillarray", "quantised")
+STREAMS = {
+    "even": {}, "uneven": {"uneven": 0.3}, "bridged gaps": {"gaps": ((100, 4), (101, 6), (250, 7))},
+    "gaps": {"gaps": ((3, 40), (150, 9), (151, 400)), "uneven": 0.1},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SENSORS)
+@pytest.mark.parametrize("stream", STREAMS)
+def test_equal_the_definitions(name, stream):
+    sensor = made(name)
+    readings, times = walk(sensor, seed=len(stream), **STREAMS[stream])
+    found = features_of(readings, times, sensor)
+    assert np.isfinite(found).all(axis=1).mean() > 0.98
+    np.testing.assert_allclose(found, naive(readings, times, sensor), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("rate", [30.0, 150.0, 500.0])
+def test_equal_the_definitions_at_other_rates(rate):
+    sensor = made("uskin-curved")
+    readings, times = walk(sensor, 1, n=int(4 * rate), rate=rate, uneven=0.05)
+    np.testing.assert_allclose(
+        features_of(readings, times, sensor, rate), naive(readings, times, sensor, rate),
+        rtol=1e-9, atol=1e-9,
+    )  # fmt: skip
