@@ -30,6 +30,32 @@ static inline bool hf_needs(uint64_t kinds, int first, int last)
     return (kinds >> (first - HF_FIRST_SLIDING) & some) != 0;
 }
 
+/* All parts of a sum over taxels, in as many vectors as they need. A loop that adds to all of them
+ * does not wait for its last sum, as one over a part of the lanes does. */
+enum { HF_N_WIDE = HF_LANES / HF_WIDTH };
+typedef struct {
+    hf_wide part[HF_N_WIDE];
+} hf_parts;
+
+static inline hf_parts hf_no_parts(void)
+{
+    const hf_wide none = {0};
+    hf_parts parts;
+    for (size_t l = 0; l < HF_N_WIDE; ++l) {
+        parts.part[l] = none;
+    }
+    return parts;
+}
+
+static inline hf_real hf_total_of(const hf_parts *parts)
+{
+    hf_sum sum;
+    for (size_t l = 0; l < HF_N_WIDE; ++l) {
+        hf_put(&sum, l * HF_WIDTH, parts->part[l]);
+    }
+    return hf_total(sum);
+}
+
 /* Return y_i (3, n) of a sample in the ring. */
 static inline hf_real *hf_slide_at(const hf_finger *f, size_t index)
 {
@@ -56,12 +82,10 @@ static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
     const size_t n = f->n;
     const hf_real band = HF_SHARE_NOISE * s;
     hf_real *const own = hf_slide_at(f, now), *const shares = f->shares;
-    hf_sum load, cx, cy, cz, friction;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide p = {0}, x = {0}, y = {0}, z = {0}, ratios = {0};
-        const hf_wide none = {0};
-        const hf_wide least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
-        for (size_t i = lane; i < n; i += HF_LANES) {
+    const hf_wide none = {0}, least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
+    hf_parts load = hf_no_parts(), cx = load, cy = load, cz = load, friction = load;
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_vectors v =
                 hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
             const hf_vectors r = hf_load_vectors(f->positions, n, i);
@@ -73,20 +97,16 @@ static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
             hf_store(shares + i, pressed);
             hf_store(shares + n + i, high * high);
             hf_store(shares + 2 * n + i, low * low);
-            p += pressed;
-            x += pressed * r.x;
-            y += pressed * r.y;
-            z += pressed * r.z;
-            ratios += pressed * hf_smaller(shear / hf_greater(pressed, least), most);
+            load.part[l] += pressed;
+            cx.part[l] += pressed * r.x;
+            cy.part[l] += pressed * r.y;
+            cz.part[l] += pressed * r.z;
+            friction.part[l] += pressed * hf_smaller(shear / hf_greater(pressed, least), most);
         }
-        hf_put(&load, lane, p);
-        hf_put(&cx, lane, x);
-        hf_put(&cy, lane, y);
-        hf_put(&cz, lane, z);
-        hf_put(&friction, lane, ratios);
     }
     const hf_slide_sums sums = {
-        hf_total(load), {hf_total(cx), hf_total(cy), hf_total(cz)}, hf_total(friction)};
+        hf_total_of(&load), {hf_total_of(&cx), hf_total_of(&cy), hf_total_of(&cz)},
+        hf_total_of(&friction)};
     return sums;
 }
 
@@ -167,22 +187,18 @@ static hf_shear_sums hf_sum_shear(const hf_finger *f, size_t now, size_t then)
 {
     const size_t n = f->n;
     const hf_real *const own = hf_slide_at(f, now), *const old = hf_slide_at(f, then);
-    hf_sum wx, wy, squares;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide x = {0}, y = {0}, square = {0};
-        for (size_t i = lane; i < n; i += HF_LANES) {
+    hf_parts x = hf_no_parts(), y = x, squares = x;
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_wide dx = hf_load(own + i) - hf_load(old + i);
             const hf_wide dy = hf_load(own + n + i) - hf_load(old + n + i);
             const hf_wide wide_x = hf_load(f->shares + i) * dx, wide_y = hf_load(f->shares + i) * dy;
-            x += wide_x;
-            y += wide_y;
-            square += wide_x * dx + wide_y * dy;
+            x.part[l] += wide_x;
+            y.part[l] += wide_y;
+            squares.part[l] += wide_x * dx + wide_y * dy;
         }
-        hf_put(&wx, lane, x);
-        hf_put(&wy, lane, y);
-        hf_put(&squares, lane, square);
     }
-    const hf_shear_sums sums = {{hf_total(wx), hf_total(wy)}, hf_total(squares)};
+    const hf_shear_sums sums = {{hf_total_of(&x), hf_total_of(&y)}, hf_total_of(&squares)};
     return sums;
 }
 
@@ -191,16 +207,14 @@ static hf_real hf_sum_pressed(const hf_finger *f, size_t now, size_t then)
 {
     const hf_real *const own = hf_slide_at(f, now) + 2 * f->n;
     const hf_real *const old = hf_slide_at(f, then) + 2 * f->n;
-    hf_sum squares;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide part = {0};
-        for (size_t i = lane; i < f->n; i += HF_LANES) {
+    hf_parts squares = hf_no_parts();
+    for (size_t i = 0; i < f->n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_wide d = hf_load(own + i) - hf_load(old + i);
-            part += d * d;
+            squares.part[l] += d * d;
         }
-        hf_put(&squares, lane, part);
     }
-    return hf_total(squares);
+    return hf_total_of(&squares);
 }
 
 /* Compute sum |N_i| over the taxels with d|T_i| < -2 s, and over those with d|T_i| > 2 s. */
@@ -208,21 +222,18 @@ static void hf_sum_shares(const hf_finger *f, size_t then, hf_real *falling, hf_
 {
     const size_t n = f->n;
     const hf_real *const old = hf_slide_at(f, then), *const shares = f->shares;
-    hf_sum falls, rises;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide fall = {0}, rise = {0};
-        const hf_wide none = {0};
-        for (size_t i = lane; i < n; i += HF_LANES) {
+    const hf_wide none = {0};
+    hf_parts falls = hf_no_parts(), rises = falls;
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_wide x = hf_load(old + i), y = hf_load(old + n + i), w = hf_load(shares + i);
             const hf_wide square = x * x + y * y;
-            fall += hf_where(square > hf_load(shares + n + i), w, none);
-            rise += hf_where(square < hf_load(shares + 2 * n + i), w, none);
+            falls.part[l] += hf_where(square > hf_load(shares + n + i), w, none);
+            rises.part[l] += hf_where(square < hf_load(shares + 2 * n + i), w, none);
         }
-        hf_put(&falls, lane, fall);
-        hf_put(&rises, lane, rise);
     }
-    *falling = hf_total(falls);
-    *rising = hf_total(rises);
+    *falling = hf_total_of(&falls);
+    *rising = hf_total_of(&rises);
 }
 
 /* Fill what compares the taxels over a lag. */
@@ -295,32 +306,26 @@ static void hf_sum_fast(const hf_finger *f, hf_second at, hf_real energies[HF_N_
     const hf_real *const own = hf_slide_at(f, at.now), *const mid = hf_slide_at(f, at.before);
     const hf_real *const old = hf_slide_at(f, at.first);
     const hf_real a = at.newest, c = at.oldest;
-    hf_sum first, shear, normal, mx, my;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide once = {0}, tt = {0}, zz = {0}, x = {0}, y = {0};
-        for (size_t i = lane; i < n; i += HF_LANES) {
+    hf_parts first = hf_no_parts(), shear = first, normal = first, mx = first, my = first;
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_vectors middle = hf_load_vectors(mid, n, i);
             const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), middle);
             const hf_vectors e = hf_minus(middle, hf_load_vectors(old, n, i));
             /* a y(k) - 2 y(k-s) + c y(k-2s), as a + c = 2. */
             const hf_vectors second = {a * d.x - c * e.x, a * d.y - c * e.y, a * d.z - c * e.z};
-            once += d.x * d.x + d.y * d.y;
-            tt += second.x * second.x + second.y * second.y;
-            zz += second.z * second.z;
-            x += second.x;
-            y += second.y;
+            first.part[l] += d.x * d.x + d.y * d.y;
+            shear.part[l] += second.x * second.x + second.y * second.y;
+            normal.part[l] += second.z * second.z;
+            mx.part[l] += second.x;
+            my.part[l] += second.y;
         }
-        hf_put(&first, lane, once);
-        hf_put(&shear, lane, tt);
-        hf_put(&normal, lane, zz);
-        hf_put(&mx, lane, x);
-        hf_put(&my, lane, y);
     }
     const hf_real share = 1 / hf_max(f->finger->n_used, 1);
-    const hf_real mean[2] = {share * hf_total(mx), share * hf_total(my)};
-    energies[0] = share * hf_total(first);
-    energies[1] = share * hf_total(shear);
-    energies[2] = share * hf_total(normal);
+    const hf_real mean[2] = {share * hf_total_of(&mx), share * hf_total_of(&my)};
+    energies[0] = share * hf_total_of(&first);
+    energies[1] = share * hf_total_of(&shear);
+    energies[2] = share * hf_total_of(&normal);
     energies[3] = energies[1] + energies[2];
     energies[4] = hf_max(energies[1] - (mean[0] * mean[0] + mean[1] * mean[1]), 0);
 }
