@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Tare
 from holdfast.detection.features import extract
+from holdfast.detection.kernel_config import stream_config
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
+    ANY_FEATURES,
     SLIDING_CHOICE,
     SLIDING_FEATURES,
     SLIDING_LAGS,
@@ -36,7 +38,8 @@ def naive(readings, times, sensor, rate=RATE):
     readings = readings.astype(float)
     changed = np.append(False, (np.diff(readings, axis=0) != 0).any(axis=(1, 2)))
     gaps = np.flatnonzero(np.diff(times) > max(3.0003 / rate, 0.10001)) + 1
-    rows, least, own = np.full((len(times), len(SLIDING_FEATURES)), np.nan), np.inf, readings - readings[0]
+    rows = np.full((len(times), len(SLIDING_FEATURES)), np.nan)
+    least, own = np.inf, readings - readings[0]
     for stretch in np.split(np.arange(len(times)), gaps):
         noise, least = noise_of(own[stretch], times[stretch], changed[stretch], sensor, rate, least)
         if len(stretch) < 2:
@@ -63,21 +66,27 @@ def noise_of(own, times, changed, sensor, rate, least):
     return np.array(found), least
 
 
-def before(times, when, samples):
-    """(n,) the sample nearest to a time before each; of two equals that of even times."""
-    found = np.zeros(len(times), dtype=int)
-    for k in range(1, len(times)):
-        near = np.abs(times[:k] - when[k])
-        best = int(near.argmin())
-        for other in (best - 1, best + 1):
-            if 0 <= other < k and near[other] - near[best] <= 0.02 * abs(times[other] - times[best]):
-                likely = k - min(max(1, round(samples)), k)
+def nearest(times, k, when, samples):
+    """Return the sample before k nearest to a time; of two equals that of even times."""
+    first = max(0, k - 4 * round(samples) - 9)  # times are not so uneven
+    near = np.abs(times[first:k] - when)
+    best = first + int(near.argmin())
+    for other in (best - 1, best + 1):
+        if first <= other < k:
+            excess = near[other - first] - near[best - first]
+            if excess <= 0.02 * abs(times[other] - times[best]):
+                likely = k - max(1, round(samples))
                 best = min(max(likely, min(best, other)), max(best, other))
-        found[k] = best
-    return found
+    return best
 
 
-def smoothed(values, times, rate, seconds):
+def before(times, lag, samples):
+    """(n,) the sample nearest to a lag before each; the first for the first."""
+    later = [nearest(times, k, times[k] - lag, samples) for k in range(1, len(times))]
+    return np.array([0, *later])
+
+
+def smoothed(values, times, seconds):
     means = [values[0]]
     for value, step in zip(values[1:], np.diff(times), strict=True):
         means.append(means[-1] + step / (step + seconds) * (value - means[-1]))
@@ -106,14 +115,14 @@ def of_stretch(own, times, s, sensor, rate):
         ("friction", 0.014): r, ("taxel_friction", 0.014): q,
         ("force_to_noise", 0.014): np.log1p(norm(force) / whole),
     }  # fmt: skip
-    mean = smoothed(r, times, rate, 0.01)
+    mean = smoothed(r, times, 0.01)
     blocks = np.floor((times - times[0]) * 16)
     for seconds in (0.5, 2.0):
         inside = (blocks[:, None] - blocks < 16 * seconds) & (np.arange(n) <= np.arange(n)[:, None])
         most = np.where(inside, mean, 0).max(axis=1)
         values["friction_margin", seconds] = mean / np.maximum(most, 1e-300)
     for lag in SLIDING_LAGS:
-        then = before(times, times - lag, lag * rate)
+        then = before(times, lag, lag * rate)
         d, change, shear = own - own[then], force - force[then], sheared - sheared[then]
         change_across = change - (change @ sensor.normal)[:, None] * sensor.normal
         common = (w[..., None] * shear).sum(axis=1)
@@ -139,7 +148,7 @@ def of_stretch(own, times, s, sensor, rate):
         values[f"fast_{what}", 0.014] = np.log1p(energy / s**2) / 2
         for over, seconds in AVERAGES.items():
             # The first sample has no difference: the average begins at the second.
-            mean = np.append(0, smoothed(energy[1:], times[1:], rate, seconds))
+            mean = np.append(0, smoothed(energy[1:], times[1:], seconds))
             values[f"fast_{what}_{over}", 0.014] = np.log1p(mean / s**2) / 2
     return values
 
@@ -147,14 +156,15 @@ def of_stretch(own, times, s, sensor, rate):
 def energies(own, times, rate):
     """Return the mean squares of the first and second differences of the taxels."""
     steps, seconds = np.zeros_like(own), np.zeros_like(own)
-    near = before(times, times - 0.014, 0.014 * rate)
+    near = before(times, 0.014, 0.014 * rate)
     for k in range(2, len(own)):
         middle = near[k]
-        if times[0] > 2 * times[middle] - times[k] + (times[k] - times[middle]) / 2 / (k - middle):
+        spacing = (times[k] - times[middle]) / (k - middle)
+        if 2 * times[middle] - times[k] < times[0] - spacing / 2:
             middle = k - min(k - middle, k // 2)
-        when = np.full(k + 1, 2 * times[middle] - times[k])
-        oldest = min(before(times[: k + 1], when, 2 * (k - middle))[k], middle - 1)
-        later, earlier = times[k] - times[middle], times[middle] - times[oldest]
+        later = times[k] - times[middle]
+        oldest = min(nearest(times, k, times[middle] - later, 2 * (k - middle)), middle - 1)
+        earlier = times[middle] - times[oldest]
         even = abs(later - earlier) <= 0.02 * (later + earlier)
         a = 1.0 if even else 2 * earlier / (later + earlier)
         steps[k] = own[k] - own[middle]
@@ -186,7 +196,7 @@ def walk(sensor, seed, n=400, rate=RATE, uneven=0.0, gaps=()):
     shape = (n, sensor.n_taxels, 3)
     load = np.clip((np.arange(n) - 60) / 30, 0, 1) * (np.arange(n) < n - 40)
     moving = np.cumsum(rng.normal(size=shape), axis=0) * 0.02
-    force = load[:, None, None] * ([0, 0, 1] + rng.random((sensor.n_taxels, 3)) + moving)
+    force = load[:, None, None] * (np.array([0, 0, 1]) + rng.random((sensor.n_taxels, 3)) + moving)
     noise = rng.normal(size=shape) * 0.003
     times = 3.0 + np.cumsum(steps) / rate
     if sensor.unit == "count":
@@ -221,3 +231,62 @@ def test_equal_the_definitions_at_other_rates(rate):
         features_of(readings, times, sensor, rate), naive(readings, times, sensor, rate),
         rtol=1e-9, atol=1e-9,
     )  # fmt: skip
+
+
+def test_one_taxel_has_those_that_compare_none():
+    sensor = made("one")
+    specs = tuple(spec for spec in SLIDING_FEATURES if spec.min_taxels == 1)
+    readings, times = walk(sensor, 0)
+    found = features_of(readings, times, sensor, specs=specs)[1:]
+    assert np.isfinite(found).all()
+    columns = [SLIDING_FEATURES.index(spec) for spec in specs]
+    np.testing.assert_allclose(found, naive(readings, times, sensor)[1:, columns], atol=1e-9)
+
+
+@settings(max_examples=20, deadline=None)
+@given(factor=st.floats(0.01, 100.0), angle=st.floats(-3.2, 3.2), shift=st.integers(-1000, 1000))
+def test_do_not_depend_on_unit_direction_and_clock(factor, angle, shift):
+    sensor = replace(made("uskin-4x4"), unit="N", range=None)  # flat: all normals are z
+    readings, times = walk(sensor, 5, n=150, uneven=0.2)
+    times = np.round(times * 2**20) / 2**20  # so that a shift rounds no difference
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    turned = factor * np.concatenate([readings[..., :2] @ turn, readings[..., 2:]], axis=2)
+    np.testing.assert_allclose(
+        features_of(turned, times + shift, sensor), features_of(readings, times, sensor), atol=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    ("push", "signs"),
+    [
+        ((0.0, 0.0, 0.5), {"normal_by_load": 1, "alignment": 0, "friction_rise": -1}),
+        ((0.5, 0.0, 0.0), {"normal_by_load": 0, "alignment": 1, "friction_rise": 1}),
+        ((-0.1, 0.0, 0.0), {"normal_by_load": 0, "alignment": -1, "friction_rise": -1}),
+    ],
+)
+def test_signs_tell_a_press_from_a_pull_and_a_release(push, signs):
+    sensor = replace(made("uskin-4x4"), unit="N", range=None)
+    readings = 1e-5 * np.random.default_rng(0).normal(size=(120, 16, 3))
+    readings[40:] += [0.2, 0.0, 1.0]
+    readings[100:] += push
+    specs = tuple(FeatureSpec(kind, transform="relative", seconds=0.1) for kind in signs)
+    found = features_of(readings, np.arange(120) / RATE, sensor, specs=specs)[100]
+    assert np.sign(np.round(found, 2)).tolist() == list(signs.values())
+
+
+def test_a_stream_computes_only_the_kinds_that_it_needs():
+    plan = StreamPlan(
+        {"a": made("uskin-4x4")}, {"a": SLIDING_CHOICE}, 14, Tare.parse("first"), RATE
+    )
+    config = stream_config(plan)
+    assert sum(int(kinds).bit_count() for kinds in config.lags["sliding"]) == len(SLIDING_CHOICE)
+    assert config.hand["n_slides"] == config.hand["n_track"] == 2 * round(0.533 * RATE) + 1
+    plan = replace(plan, features={"a": ANY_FEATURES})
+    assert stream_config(plan).hand["n_slides"] == 0
+
+
+def test_the_lists():
+    assert (len(SLIDING_FEATURES), len(set(SLIDING_FEATURES))) == (97, 97)
+    assert len(SLIDING_CHOICE) == 32
+    assert set(SLIDING_CHOICE) < set(SLIDING_FEATURES)
+    assert sum(spec.kind not in ZERO_KINDS for spec in SLIDING_FEATURES) == 92

@@ -43,9 +43,7 @@ class FeatureKind(NamedTuple):
 def _over_lag(name: str, family: Family, min_taxels: int = 1, reach: int = 1) -> FeatureKind:
     # A value over a lag has a unit and depends on the hand: only its ratio to the load or to the
     # noise, whose logarithm is `relative`, carries over.
-    return FeatureKind(
-        name, family, "lag", min_taxels, ("relative",), reach=reach, by_name=False
-    )
+    return FeatureKind(name, family, "lag", min_taxels, ("relative",), reach=reach, by_name=False)
 
 
 KINDS = {
