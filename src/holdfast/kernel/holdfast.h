@@ -11,7 +11,8 @@
  *              -> changes and faulty taxels (faults.c)
  *              -> tare and noise (tare.c) -> magnetic field taken out (field.c)
  *              -> faulty taxels filled in (masks.c)
- *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c)
+ *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c), sliding
+ *                 (sliding.c)
  *              -> features (stream.c)
  *              -> contact? (contact.c) -> heads: stable, slip, slip_speed, cause (heads.c)
  *              -> forward filter, hysteresis, hold, minimum duration (decision.c)

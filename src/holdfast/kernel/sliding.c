@@ -3,7 +3,7 @@
  * They have no unit. Of taxel i, y_i = f_i - b_i is the reading beyond the tare in its own frame,
  * N_i = (y_i)_z, T_i = (y_i)_xy, and w_i = |N_i| / sum |N_j| its share of the load. F is the
  * fingertip force, F_z = F . n, F_t = F - F_z n, s the noise of a reading, m the number of taxels,
- * and L = max(sum |N_i|, 10 s sqrt(m)). docs/details/sliding.md lists all. */
+ * and L = max(sum |N_i|, 10 s sqrt(m)). docs/details/models.md lists all. */
 #include "finger.h"
 
 /* Least load in a denominator: of a finger, by s sqrt(m), and of a taxel, by s. */
@@ -110,32 +110,37 @@ static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
     return sums;
 }
 
-/* Add a friction to the largest of each block of time, of which `past[j]` keeps the largest of the
- * j blocks before this one. */
+/* Return how many whole blocks of time a number is, from 1 to those that are kept. */
+static size_t hf_n_blocks(double blocks)
+{
+    const size_t most = HF_N_FRICTION_BLOCKS;
+    if (blocks >= (double)most) {
+        return most;
+    }
+    return blocks > 1 ? (size_t)blocks : 1;
+}
+
+/* Add the friction to the largest of its block of time. `past[j]` is the largest of the j blocks
+ * before this one: so many blocks suffice at any rate. */
 static void hf_note_friction(holdfast_slide *m, double time)
 {
-    const double elapsed = (time - m->block_start) * HF_BLOCKS_PER_SECOND;
-    if (elapsed >= 1) {
-        const double passed = elapsed < HF_N_FRICTION_BLOCKS ? floor(elapsed) : elapsed;
-        const size_t n = passed < HF_N_FRICTION_BLOCKS ? (size_t)passed : HF_N_FRICTION_BLOCKS;
+    const double passed = floor((time - m->block_start) * HF_BLOCKS_PER_SECOND);
+    if (passed >= 1) {
+        const size_t n = hf_n_blocks(passed);
         for (size_t j = HF_N_FRICTION_BLOCKS; j-- > n;) {
             m->past[j] = hf_max(m->past[j - n], m->largest);
         }
-        for (size_t j = 0; j < n; ++j) {
-            m->past[j] = 0; /* blocks without a sample */
-        }
+        hf_fill(m->past, n, 0); /* blocks without a sample */
         m->block_start += passed / HF_BLOCKS_PER_SECOND;
         m->largest = 0;
     }
     m->largest = hf_max(m->largest, m->friction);
 }
 
-/* Return the friction as a share of the largest of some seconds. */
+/* Return the friction as a share of the largest of some seconds; 0 without shear. */
 static hf_real hf_margin(const holdfast_slide *m, double seconds)
 {
-    /* q(k) / max q(j) over the block of the sample and those before it; 0 without shear. */
-    const double blocks = seconds * HF_BLOCKS_PER_SECOND + 0.5;
-    const size_t n = blocks < 1 ? 1 : (size_t)(blocks < HF_N_FRICTION_BLOCKS ? blocks : HF_N_FRICTION_BLOCKS);
+    const size_t n = hf_n_blocks(seconds * HF_BLOCKS_PER_SECOND + 0.5);
     return m->friction / hf_max(hf_max(m->past[n - 1], m->largest), HF_TINY);
 }
 
@@ -192,10 +197,10 @@ static hf_shear_sums hf_sum_shear(const hf_finger *f, size_t now, size_t then)
         for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_wide dx = hf_load(own + i) - hf_load(old + i);
             const hf_wide dy = hf_load(own + n + i) - hf_load(old + n + i);
-            const hf_wide wide_x = hf_load(f->shares + i) * dx, wide_y = hf_load(f->shares + i) * dy;
-            x.part[l] += wide_x;
-            y.part[l] += wide_y;
-            squares.part[l] += wide_x * dx + wide_y * dy;
+            const hf_wide w = hf_load(f->shares + i), wx = w * dx, wy = w * dy;
+            x.part[l] += wx;
+            y.part[l] += wy;
+            squares.part[l] += wx * dx + wy * dy;
         }
     }
     const hf_shear_sums sums = {{hf_total_of(&x), hf_total_of(&y)}, hf_total_of(&squares)};
