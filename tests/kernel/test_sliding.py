@@ -196,7 +196,10 @@ def walk(sensor, seed, n=400, rate=RATE, uneven=0.0, gaps=()):
     shape = (n, sensor.n_taxels, 3)
     load = np.clip((np.arange(n) - 60) / 30, 0, 1) * (np.arange(n) < n - 40)
     moving = np.cumsum(rng.normal(size=shape), axis=0) * 0.02
-    force = load[:, None, None] * (np.array([0, 0, 1]) + rng.random((sensor.n_taxels, 3)) + moving)
+    # Mostly shear, so that the ratios reach their bound; and by less than a step at a time.
+    push = np.array([9, 0, 1] if sensor.name == "papillarray" else [0, 0, 1])
+    moving *= 0.05 if sensor.step else 1
+    force = load[:, None, None] * (push + rng.random((sensor.n_taxels, 3)) + moving)
     noise = rng.normal(size=shape) * 0.003
     times = 3.0 + np.cumsum(steps) / rate
     if sensor.unit == "count":
