@@ -125,6 +125,7 @@ static void make_sizes(input *in, holdfast_hand *hand)
     hand->alike = take(in, 1) % 2;
     hand->has_centres = take(in, 1) % 2;
     hand->has_ratios = take(in, 1) % 2;
+    hand->zero_unknown = take(in, 1) % 2;
 }
 
 /* Make heads and limits of a finger; the input then spoils some. */
@@ -206,7 +207,6 @@ static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
     model.hold = (hf_real)(take(in, 1) % 2) / 10;
     model.has_filter = take(in, 1) % 2;
     model.switching = 15;
-    model.zero_unknown = take(in, 1) % 2;
     model.n_weights = 8 + (6 + 3) * (hand->n_features + 1);
     holdfast_rule *const rules = (holdfast_rule *)calloc(hand->n_fingers, sizeof *rules);
     hf_real *const weights = (hf_real *)calloc(model.n_weights, sizeof(hf_real));

@@ -322,13 +322,13 @@ static const hf_real hf_weights[936] = {
 (hf_real)-0.4042023832180394, (hf_real)1.08965067339094, (hf_real)-0.22777408708041053};
 static const holdfast_hand hf_hand =
 
-{2, 12, 62, 1, 14, 4, 3, 13, 13, (hf_real)0.03333333333333333, 0, (hf_real)0.5, (hf_real)0.5, (hf_real)0.8111243971624382, false, true, true, hf_fingers, hf_features, hf_lags, hf_used, hf_rotations, hf_positions};
+{2, 12, 62, 1, 14, 4, 3, 13, 13, (hf_real)0.03333333333333333, 0, (hf_real)0.5, (hf_real)0.5, (hf_real)0.8111243971624382, false, true, true, false, hf_fingers, hf_features, hf_lags, hf_used, hf_rotations, hf_positions};
 static const holdfast_rule hf_rules[2] = {
 
 {{{1, 62, 0, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 62, 63, true, (hf_real)0.5, (hf_real)0.8111243971624382, (hf_real)0.05, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 62, 312, true, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)3.0, {0, 0, 0, 0, 0, 0}}, {3, 62, 561, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {1, 2, 6, 0, 0, 0}}}, 3, (hf_real)3.0},
 {{{1, 15, 750, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 15, 766, true, (hf_real)0.5, (hf_real)0.8111243971624382, (hf_real)0.05, (hf_real)0.0, {0, 0, 0, 0, 0, 0}}, {1, 15, 827, true, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)3.0, {0, 0, 0, 0, 0, 0}}, {3, 15, 888, false, (hf_real)0.5, (hf_real)1.0, (hf_real)0.0, (hf_real)0.0, {1, 2, 6, 0, 0, 0}}}, 2, (hf_real)8.0}};
 static const holdfast_model hf_model =
-{&hf_hand, hf_rules, hf_weights, 936, 2, (hf_real)0.05, (hf_real)0.08, (hf_real)0.1, true, (hf_real)15.0, false};
+{&hf_hand, hf_rules, hf_weights, 936, 2, (hf_real)0.05, (hf_real)0.08, (hf_real)0.1, true, (hf_real)15.0};
 
 enum { N_SAMPLES = 260, EVERY = 10 };
 

@@ -154,6 +154,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
         "has_ratios": any(lag["has_ratios"] for lag in lags),
+        "zero_unknown": plan.zero_unknown,
     }
 
 
@@ -283,7 +284,6 @@ def model_config(
         "hold": debounce.hold,
         "has_filter": debounce.switching_rate > 0,
         "switching": debounce.switching_rate,
-        "zero_unknown": plan.zero_unknown,
     }
     by_finger = structs("holdfast_head", heads).reshape(len(parts), len(HEAD_NAMES))
     rules = [_contact(part) | {"heads": own} for part, own in zip(parts, by_finger, strict=True)]

@@ -88,7 +88,7 @@ HF_API int32_t holdfast_detect(
         holdfast_decision *const decision = &d->decisions[i];
         int contact = HF_IN_CONTACT;
         if (present[i] && f.values->reason == HOLDFAST_READY) {
-            contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
+            contact = hf_find_contact(&f, rule, decision, model->hand->zero_unknown, time);
         }
         if (!f.state->is_alive && contact != HF_WITHOUT_CONTACT &&
             f.values->reason == HOLDFAST_READY) {

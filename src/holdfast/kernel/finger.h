@@ -51,7 +51,7 @@ typedef struct {
     hf_real *reference;
     hf_real *changes;
     hf_real *pressed; /* (n) */
-    hf_real *shares;  /* (3, n) */
+    hf_real *shares;  /* (4, n) */
     hf_real *powers;  /* (2, n) */
     holdfast_taxel *taxels;
     holdfast_mask *masks;

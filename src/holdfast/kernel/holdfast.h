@@ -349,6 +349,7 @@ typedef struct {
     bool alike;            /* all fingers have the same features */
     bool has_centres;      /* some lag has changes: centre of pressure and moment are needed */
     bool has_ratios;       /* some lag has ratios */
+    bool zero_unknown;     /* the first samples are load, and no readings without are known */
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */
     const holdfast_lag *lags;         /* (n_lags), ascending */
@@ -398,7 +399,6 @@ typedef struct {
     hf_real hold;           /* time for which UNSTABLE is held [s] */
     bool has_filter;        /* the forward filter is used */
     hf_real switching;      /* how often a contact turns from one state to the other [1/s] */
-    bool zero_unknown;      /* the first samples are load, and no readings without are known */
 } holdfast_model;
 
 /* Estimate of a finger. Numbers that the model does not give are NaN. */

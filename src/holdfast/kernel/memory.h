@@ -182,7 +182,7 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
-    HF_ARRAY(hf_real, shares, 3 * HOLDFAST_N_LANES);    /* likewise, see sliding.c */
+    HF_ARRAY(hf_real, shares, 4 * HOLDFAST_N_LANES);    /* likewise, see sliding.c */
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */

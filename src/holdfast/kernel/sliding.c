@@ -89,7 +89,8 @@ static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
             const hf_vectors v =
                 hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
             const hf_vectors r = hf_load_vectors(f->positions, n, i);
-            const hf_wide pressed = hf_wide_abs(v.z), shear = hf_root(v.x * v.x + v.y * v.y);
+            const hf_wide pressed = hf_wide_abs(v.z - hf_load(shares + 3 * n + i));
+            const hf_wide shear = hf_root(v.x * v.x + v.y * v.y);
             const hf_wide low = hf_greater(shear - band, none), high = shear + band;
             hf_store(own + i, v.x);
             hf_store(own + n + i, v.y);
@@ -144,6 +145,18 @@ static hf_real hf_margin(const holdfast_slide *m, double seconds)
     return m->friction / hf_max(hf_max(m->past[n - 1], m->largest), HF_TINY);
 }
 
+/* Store N_i at the least F . n so far, if this is it: where the readings without contact are not
+ * known, N_i counts from there. A skin can only be pressed. */
+static void hf_note_least(const hf_finger *f, hf_real normal)
+{
+    if (normal > f->state->motion.least_normal) {
+        return;
+    }
+    for (size_t i = 2 * f->n; i < 3 * f->n; ++i) {
+        f->shares[f->n + i] = f->readings[i] - f->baseline[i];
+    }
+}
+
 HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_real step)
 {
     holdfast_slide *const m = &f->state->slide;
@@ -153,13 +166,16 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     const hf_real of_taxel = f->state->motion.taxel_noise / hf_sqrt(3 * n_used);
     m->noise = hf_max(of_taxel, f->finger->step_noise);
     m->force_noise = m->noise * hf_sqrt(n_used);
+    const hf_real normal = hf_dot(track->force, f->finger->normal);
+    if (f->hand->zero_unknown) {
+        hf_note_least(f, normal);
+    }
     const hf_slide_sums sums = hf_sum_slide(f, now, m->noise);
     const hf_real least = HF_LEAST_LOAD * m->force_noise;
     m->weight = hf_max(sums.load, HF_TINY);
     m->load = hf_max(sums.load, least);
     /* F_t / |F_t|, r = min(|F_t| / max(|F_z|, 10 s sqrt(m)), 5), and the same of the taxels by w;
      * c = sum w_i r_i. */
-    const hf_real normal = hf_dot(track->force, f->finger->normal);
     hf_real shear[3];
     for (size_t axis = 0; axis < 3; ++axis) {
         shear[axis] = track->force[axis] - normal * f->finger->normal[axis];

@@ -25,7 +25,7 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.reference = memory->reference + 3 * first;
     f.changes = memory->changes + 3 * first;
     f.pressed = memory->pressed + first;
-    f.shares = memory->shares + 3 * first;
+    f.shares = memory->shares + 4 * first;
     f.powers = memory->powers + 2 * first;
     f.taxels = memory->taxels + first;
     f.masks = memory->masks + first;

@@ -179,7 +179,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->baseline = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->reference = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
-    m->shares = (hf_real *)hf_take(block, &used, 3 * lanes, width);
+    m->shares = (hf_real *)hf_take(block, &used, 4 * lanes, width);
     m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
     m->sums = (hf_real *)hf_take(block, &used, fingers * HF_N_RING_SUMS, width);
