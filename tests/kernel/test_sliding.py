@@ -43,9 +43,8 @@ def naive(readings, times, sensor, rate=RATE, loaded=False):
     least, own = np.inf, readings - readings[0]
     # Without a known zero, normal forces count from the least normal force of the finger so far.
     along = np.einsum("nij,tnj->ti", sensor.rotations, own) @ sensor.normal
-    zero = own[
-        [np.flatnonzero(along[: k + 1] == along[: k + 1].min())[-1] for k in range(len(own))]
-    ]
+    newest = np.where(along == np.minimum.accumulate(along), np.arange(len(own)), 0)
+    zero = own[np.maximum.accumulate(newest)]
     for stretch in np.split(np.arange(len(times)), gaps):
         noise, least = noise_of(own[stretch], times[stretch], changed[stretch], sensor, rate, least)
         if len(stretch) < 2:

@@ -157,6 +157,8 @@ static void hf_note_least(const hf_finger *f, hf_real normal)
     }
 }
 
+/* Append a sample to the rings: y_i, |F|, the frictions, the centre of pressure; and update s, L,
+ * the tangent and the largest friction. After `hf_append_taxels` and the noise. */
 HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_real step)
 {
     holdfast_slide *const m = &f->state->slide;
@@ -351,7 +353,7 @@ static void hf_sum_fast(const hf_finger *f, hf_second at, hf_real energies[HF_N_
     energies[4] = hf_max(energies[1] - (mean[0] * mean[0] + mean[1] * mean[1]), 0);
 }
 
-/* Fill the energies of the fast changes, and their averages. */
+/* Fill the energies of the fast changes, and their averages, that some finger needs. */
 HF_SHARED void hf_fill_energies(
     const hf_finger *f, uint64_t kinds, hf_second at, hf_real step, hf_real *averages,
     hf_real *out)
@@ -373,6 +375,7 @@ HF_SHARED void hf_fill_energies(
     }
 }
 
+/* Fill the features of sliding over one lag that some finger needs, but for the energies. */
 HF_SHARED void hf_fill_slide(
     const hf_finger *f, const holdfast_lag *lag, size_t now, size_t then, hf_real *out)
 {
