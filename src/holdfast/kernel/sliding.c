@@ -200,63 +200,40 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     hf_note_friction(m, time);
 }
 
-/* Sums over the changes of the taxels' shear over a lag. */
+/* Sums over the changes of the taxels over a lag. */
 typedef struct {
     hf_real mean[2]; /* sum |N_i| dT_i */
     hf_real squares; /* sum |N_i| |dT_i|^2 */
-} hf_shear_sums;
+    hf_real pressed; /* sum dN_i^2 */
+    hf_real falling; /* sum |N_i| over the taxels with d|T_i| < -2 s */
+    hf_real rising;  /* the same with d|T_i| > 2 s */
+} hf_change_sums;
 
-static hf_shear_sums hf_sum_shear(const hf_finger *f, size_t now, size_t then)
+static hf_change_sums hf_sum_changes(const hf_finger *f, size_t now, size_t then)
 {
     const size_t n = f->n;
     const hf_real *const own = hf_slide_at(f, now), *const old = hf_slide_at(f, then);
-    hf_parts x = hf_no_parts(), y = x, squares = x;
-    for (size_t i = 0; i < n;) {
-        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
-            const hf_wide dx = hf_load(own + i) - hf_load(old + i);
-            const hf_wide dy = hf_load(own + n + i) - hf_load(old + n + i);
-            const hf_wide w = hf_load(f->shares + i), wx = w * dx, wy = w * dy;
-            x.part[l] += wx;
-            y.part[l] += wy;
-            squares.part[l] += wx * dx + wy * dy;
-        }
-    }
-    const hf_shear_sums sums = {{hf_total_of(&x), hf_total_of(&y)}, hf_total_of(&squares)};
-    return sums;
-}
-
-/* Return sum dN_i^2. */
-static hf_real hf_sum_pressed(const hf_finger *f, size_t now, size_t then)
-{
-    const hf_real *const own = hf_slide_at(f, now) + 2 * f->n;
-    const hf_real *const old = hf_slide_at(f, then) + 2 * f->n;
-    hf_parts squares = hf_no_parts();
-    for (size_t i = 0; i < f->n;) {
-        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
-            const hf_wide d = hf_load(own + i) - hf_load(old + i);
-            squares.part[l] += d * d;
-        }
-    }
-    return hf_total_of(&squares);
-}
-
-/* Compute sum |N_i| over the taxels with d|T_i| < -2 s, and over those with d|T_i| > 2 s. */
-static void hf_sum_shares(const hf_finger *f, size_t then, hf_real *falling, hf_real *rising)
-{
-    const size_t n = f->n;
-    const hf_real *const old = hf_slide_at(f, then), *const shares = f->shares;
+    const hf_real *const shares = f->shares;
     const hf_wide none = {0};
-    hf_parts falls = hf_no_parts(), rises = falls;
+    hf_parts wx = hf_no_parts(), wy = wx, squares = wx, pressed = wx, falls = wx, rises = wx;
     for (size_t i = 0; i < n;) {
         for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
-            const hf_wide x = hf_load(old + i), y = hf_load(old + n + i), w = hf_load(shares + i);
-            const hf_wide square = x * x + y * y;
+            const hf_vectors before = hf_load_vectors(old, n, i);
+            const hf_vectors d = hf_minus(hf_load_vectors(own, n, i), before);
+            const hf_wide w = hf_load(shares + i), x = w * d.x, y = w * d.y;
+            const hf_wide square = before.x * before.x + before.y * before.y;
+            wx.part[l] += x;
+            wy.part[l] += y;
+            squares.part[l] += x * d.x + y * d.y;
+            pressed.part[l] += d.z * d.z;
             falls.part[l] += hf_where(square > hf_load(shares + n + i), w, none);
             rises.part[l] += hf_where(square < hf_load(shares + 2 * n + i), w, none);
         }
     }
-    *falling = hf_total_of(&falls);
-    *rising = hf_total_of(&rises);
+    const hf_change_sums sums = {
+        {hf_total_of(&wx), hf_total_of(&wy)}, hf_total_of(&squares), hf_total_of(&pressed),
+        hf_total_of(&falls), hf_total_of(&rises)};
+    return sums;
 }
 
 /* Fill what compares the taxels over a lag. */
@@ -266,10 +243,10 @@ static void hf_fill_spread(
     const holdfast_slide *const m = &f->state->slide;
     const hf_real n_used = hf_max(f->finger->n_used, 1), by_load = n_used / m->load;
     const hf_real share = 1 / m->weight;
+    const hf_change_sums sums = hf_sum_changes(f, now, then);
     if (hf_needs(kinds, HF_DIVERGENCE, HF_RELATIVE_DIVERGENCE)) {
         /* u = sum w_i dT_i, v = sqrt(sum w_i |dT_i|^2 - |u|^2): log((v + s) m / L) and
          * log((v + s) / (|u| + s)). */
-        const hf_shear_sums sums = hf_sum_shear(f, now, then);
         const hf_real x = share * sums.mean[0], y = share * sums.mean[1];
         const hf_real square = x * x + y * y;
         const hf_real spread = hf_sqrt(hf_max(share * sums.squares - square, 0)) + m->noise;
@@ -282,14 +259,11 @@ static void hf_fill_spread(
     }
     if (hf_needs(kinds, HF_NORMAL_DIVERGENCE, HF_NORMAL_DIVERGENCE)) {
         /* log((sqrt(sum dN_i^2 / m) + s) m / L). */
-        const hf_real change = hf_sqrt(hf_sum_pressed(f, now, then) / n_used);
+        const hf_real change = hf_sqrt(sums.pressed / n_used);
         out[HF_NORMAL_DIVERGENCE] = hf_log((change + m->noise) * by_load);
     }
-    if (hf_needs(kinds, HF_FALLING_SHARE, HF_RISING_SHARE)) {
-        hf_sum_shares(f, then, &out[HF_FALLING_SHARE], &out[HF_RISING_SHARE]);
-        out[HF_FALLING_SHARE] *= share;
-        out[HF_RISING_SHARE] *= share;
-    }
+    out[HF_FALLING_SHARE] = share * sums.falling;
+    out[HF_RISING_SHARE] = share * sums.rising;
 }
 
 /* Fill the changes of the force, of its friction and of the centre of pressure over a lag. */
