@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from holdfast.contact import CAUSES, SLIP_CODE
-from holdfast.detection.heads import HEAD_NAMES, Debounce, FingerModel, Head
+from holdfast.detection.heads import KERNEL_HEADS, Debounce, FingerModel, Head
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec, kinds_of
 from holdfast.kernel import _extension
@@ -257,8 +257,8 @@ def model_config(
     heads: list[Row] = []
     numbers = [np.empty(0)]
     for part in parts:
-        for name in HEAD_NAMES:
-            head = part.head(name)
+        for name in KERNEL_HEADS:
+            head = part.deciding(name, zero_unknown=plan.zero_unknown)
             rows, squares, causes = _numbers(part, head)
             heads.append(
                 {
@@ -285,18 +285,24 @@ def model_config(
         "has_filter": debounce.switching_rate > 0,
         "switching": debounce.switching_rate,
     }
-    by_finger = structs("holdfast_head", heads).reshape(len(parts), len(HEAD_NAMES))
+    by_finger = structs("holdfast_head", heads).reshape(len(parts), len(KERNEL_HEADS))
     rules = [_contact(part) | {"heads": own} for part, own in zip(parts, by_finger, strict=True)]
     return ModelConfig(
         structs("holdfast_model", [settings]), structs("holdfast_rule", rules), weights
     )
 
 
+def stable_thresholds(rules: Structs) -> list[float]:
+    """Return the threshold of stability of each finger."""
+    thresholds: list[float] = rules["heads"][:, KERNEL_HEADS.index("stable")]["threshold"].tolist()
+    return thresholds
+
+
 def with_thresholds(rules: Structs, thresholds: Mapping[int, float]) -> Structs:
     """Return the rules with other thresholds of stability, by the index of the finger."""
     changed = rules.copy()
     for finger, threshold in thresholds.items():
-        changed["heads"][finger, HEAD_NAMES.index("stable")]["threshold"] = threshold
+        changed["heads"][finger, KERNEL_HEADS.index("stable")]["threshold"] = threshold
     return changed
 
 
@@ -322,7 +328,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
         return np.zeros((0, 1)), np.zeros((0, 0)), []
     columns = part.indices(head)
     # A head reads the features up to the last that it uses; those of slips read all.
-    is_slip = head.name in ("slip", "slip_speed")
+    is_slip = head.name in ("slip", "slip_speed", "slip_changes")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
     # A row is the intercept, then a weight for each feature: 0 for those that it does not use.
     rows = np.zeros((head.rule.n_outputs, n + 1))

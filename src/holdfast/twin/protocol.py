@@ -77,18 +77,21 @@ class Plan(NamedTuple):
     loads: Sequence[Load] = ()
     glitch_size: float = 1.0
 
-    def eased(self, onsets: Array, glitched: Flags) -> "Plan":
+    def eased(self, onsets: Array, glitched: Flags, *, firmer: bool = False) -> "Plan":
         """Return the plan of the same grasp after some slips, made more gently.
 
         Glitches have `EASED` of their size if one of them made a finger slide. So has whatever else
-        acted at the onset of a slip, or within `EASED_TIME` before. Where nothing acted, the grip
-        is firmer by `FIRMER`.
+        acted at the onset of a slip, or within `EASED_TIME` before. The grip is firmer by `FIRMER`
+        where nothing acted, and on demand.
 
         Args:
             onsets: (n,) of the slips, after the lock [s].
             glitched: (n,) whether a glitch of the controller made the slip.
+            firmer: whether the grip is firmer in any case.
         """
-        spans = [(x.start, x.end) for x in (*self.disturbances, *self.impacts, *self.loads)]
+        actions: list[Disturbance | Impact | Load]
+        actions = [*self.disturbances, *self.impacts, *self.loads]
+        spans = [(action.start, action.end) for action in actions]
         starts, ends = np.array(spans).reshape(-1, 2).T[:, :, None]
         acted = (starts <= onsets) & (onsets <= ends + EASED_TIME) & ~glitched
         factors = iter(np.where(acted.any(axis=1), EASED, 1.0).tolist())
@@ -97,7 +100,7 @@ class Plan(NamedTuple):
             impacts=[impact._replace(size=impact.size * next(factors)) for impact in self.impacts],
             loads=[load._replace(size=load.size * next(factors)) for load in self.loads],
             glitch_size=self.glitch_size * (EASED if glitched.any() else 1.0),
-            grips=self.grips * (FIRMER if (~acted.any(axis=0) & ~glitched).any() else 1.0),
+            grips=self.grips * (FIRMER if firmer or (~acted.any(axis=0) & ~glitched).any() else 1),
         )
 
 

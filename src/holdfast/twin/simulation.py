@@ -49,8 +49,9 @@ from holdfast.twin.world import TruthLog, World, fingertip_of
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
-MAX_EASED = 20
-"""Maximum number of attempts until nothing slides; what acts then has 0.1 % of its size."""
+MAX_EASED, N_EASED_ALONE = 20, 3
+"""Maximum number of attempts until nothing slides; and of those after which only what acts is
+weaker. An object that is nearly too heavy for the grip needs a firmer one, too."""
 GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 MAX_DURATION, MAX_UNHELD_DURATION = 60.0, 25.0
@@ -400,18 +401,17 @@ def simulate(
     return simulation.recording()
 
 
-def plan_without_slips(
-    grasp: Grasp, plan: Plan, parameters: UskinParameters | None = None
-) -> Plan:
+def plan_without_slips(grasp: Grasp, plan: Plan, parameters: UskinParameters | None = None) -> Plan:
     """Return the plan of the same grasp by which no finger slides 0.1 mm.
 
-    Whatever made a finger slide is weaker in the next attempt, as `Plan.eased` says: a person who
-    feels the object slide pushes less there, and goes on as before elsewhere.
+    Whatever made a finger slide is weaker in the next attempt, as `Plan.eased` says, and after a
+    few the grip is firmer: a person who feels the object slide pushes less there, and holds it
+    better.
 
     Raises:
         ValueError: something slides in each of `MAX_EASED` attempts.
     """
-    for _ in range(MAX_EASED):
+    for attempt in range(MAX_EASED):
         simulation = Simulation(grasp, parameters, plan=plan)
         while not simulation.is_over:
             simulation.step()
@@ -423,7 +423,7 @@ def plan_without_slips(
         if not onsets.size and not simulation.protocol.failed:
             return plan
         shaken = glitches(truth, LabelRule())[np.searchsorted(truth.times, onsets)]
-        plan = plan.eased(onsets - lock, shaken)
+        plan = plan.eased(onsets - lock, shaken, firmer=attempt >= N_EASED_ALONE)
     raise ValueError(f"{grasp.name}: something slides in each of {MAX_EASED} attempts")
 
 
