@@ -66,9 +66,11 @@ def test_json(capsys, folder, tmp_path):
     (seen,) = report["sensors"]
     assert set(seen) == {
         "sensor", "fingers", "seconds", "load_change", "n_features", "n_changed", "activity",
-        "still", "before", "after",
+        "still", "before", "after", "slips",
     }  # fmt: skip
-    assert seen["after"]["alarms_per_minute"] <= 4
+    (slips,) = seen["slips"]
+    assert slips["n"] <= 4 * slips["minutes"]
+    assert len(slips["highest"]) == 5
     handling = Model.load(out).fingers["*"].handling["pad"]
     assert handling.thresholds["stable"] == seen["after"]["threshold"]
 

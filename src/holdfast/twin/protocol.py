@@ -80,20 +80,20 @@ class Plan(NamedTuple):
     def eased(self, onsets: Array, glitched: Flags, *, firmer: bool = False) -> "Plan":
         """Return the plan of the same grasp after some slips, made more gently.
 
-        Glitches have `EASED` of their size if one of them made a finger slide. So has whatever else
-        acted at the onset of a slip, or within `EASED_TIME` before. The grip is firmer by `FIRMER`
-        where nothing acted, and on demand.
+        What acted at the onset of a slip, or within `EASED_TIME` before, has `EASED` of its size,
+        and so have all glitches after one of them. The grip is firmer by `FIRMER` where nothing
+        acted, and on demand.
 
         Args:
             onsets: (n,) of the slips, after the lock [s].
-            glitched: (n,) whether a glitch of the controller made the slip.
+            glitched: (n,) whether a glitch of the controller acted then.
             firmer: whether the grip is firmer in any case.
         """
         actions: list[Disturbance | Impact | Load]
         actions = [*self.disturbances, *self.impacts, *self.loads]
         spans = [(action.start, action.end) for action in actions]
         starts, ends = np.array(spans).reshape(-1, 2).T[:, :, None]
-        acted = (starts <= onsets) & (onsets <= ends + EASED_TIME) & ~glitched
+        acted = (starts <= onsets) & (onsets <= ends + EASED_TIME)
         factors = iter(np.where(acted.any(axis=1), EASED, 1.0).tolist())
         return self._replace(
             disturbances=[push.scaled(next(factors)) for push in self.disturbances],

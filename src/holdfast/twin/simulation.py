@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from holdfast.twin.magnetic_faults import WITHOUT_FAULTS, MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
-from holdfast.twin.profile import Profile, profile
+from holdfast.twin.profile import GRASP_ATTEMPTS, Profile, profile
 from holdfast.twin.protocol import (
     MIN_TOUCH_LOAD,
     THUMB_SHARE,
@@ -49,9 +49,9 @@ from holdfast.twin.world import TruthLog, World, fingertip_of
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
-MAX_EASED, N_EASED_ALONE = 20, 3
-"""Maximum number of attempts until nothing slides; and of those after which only what acts is
-weaker. An object that is nearly too heavy for the grip needs a firmer one, too."""
+MAX_EASED, N_EASED_ALONE = 8, 3
+"""How often a grasp is made until nothing slides, before all is drawn anew; and how often only what
+acts is weaker. An object that is nearly too heavy for the grip needs a firmer one, too."""
 GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 MAX_DURATION, MAX_UNHELD_DURATION = 60.0, 25.0
@@ -390,9 +390,9 @@ def simulate(
     Raises:
         ValueError: object, profile, case or sensor is unknown, or the object cannot be grasped.
     """
-    plan = draw_plan(grasp, profile(grasp.profile))
-    if plan.profile.without_slips:
-        plan = plan_without_slips(grasp, plan, parameters)
+    plan = None
+    if profile(grasp.profile).without_slips:
+        grasp, plan = without_slips(grasp, parameters)
     simulation = Simulation(grasp, parameters, plan=plan)
     while not simulation.is_over:
         simulation.step()
@@ -401,30 +401,35 @@ def simulate(
     return simulation.recording()
 
 
-def plan_without_slips(grasp: Grasp, plan: Plan, parameters: UskinParameters | None = None) -> Plan:
-    """Return the plan of the same grasp by which no finger slides 0.1 mm.
+def without_slips(
+    grasp: Grasp, parameters: UskinParameters | None = None
+) -> tuple[Grasp, Plan]:
+    """Return a grasp and its plan by which no finger slides 0.1 mm.
 
-    Whatever made a finger slide is weaker in the next attempt, as `Plan.eased` says, and after a
-    few the grip is firmer: a person who feels the object slide pushes less there, and holds it
-    better.
+    Whatever made a finger slide is weaker when the grasp is made again, as `Plan.eased` says, and
+    after a few times the grip is firmer: a person who feels the object slide pushes less there,
+    and holds it better. After `MAX_EASED` times, all numbers are drawn anew as for another attempt.
 
     Raises:
-        ValueError: something slides in each of `MAX_EASED` attempts.
+        ValueError: something slides however often the grasp is made.
     """
-    for attempt in range(MAX_EASED):
-        simulation = Simulation(grasp, parameters, plan=plan)
-        while not simulation.is_over:
-            simulation.step()
-        lock, truth = simulation.protocol.locked_at, simulation.truth()
-        if lock is None:  # never closed: another attempt has other numbers
-            return plan
-        slips = [slip for finger in FINGERS for slip in finger_slips(truth, finger)]
-        onsets = np.array([slip.onset for slip in slips if slip.distance >= MIN_SLIP_DISTANCE])
-        if not onsets.size and not simulation.protocol.failed:
-            return plan
-        shaken = glitches(truth, LabelRule())[np.searchsorted(truth.times, onsets)]
-        plan = plan.eased(onsets - lock, shaken, firmer=attempt >= N_EASED_ALONE)
-    raise ValueError(f"{grasp.name}: something slides in each of {MAX_EASED} attempts")
+    for attempt in range(grasp.attempt, grasp.attempt + GRASP_ATTEMPTS):
+        drawn = replace(grasp, attempt=attempt)
+        plan = draw_plan(drawn, profile(grasp.profile))
+        for n_made in range(MAX_EASED):
+            simulation = Simulation(drawn, parameters, plan=plan)
+            while not simulation.is_over:
+                simulation.step()
+            lock, truth = simulation.protocol.locked_at, simulation.truth()
+            if lock is None:  # never closed
+                break
+            slips = [slip for finger in FINGERS for slip in finger_slips(truth, finger)]
+            onsets = np.array([s.onset for s in slips if s.distance >= MIN_SLIP_DISTANCE])
+            if not onsets.size and not simulation.protocol.failed:
+                return drawn, plan
+            shaken = glitches(truth, LabelRule())[np.searchsorted(truth.times, onsets)]
+            plan = plan.eased(onsets - lock, shaken, firmer=n_made >= N_EASED_ALONE)
+    raise ValueError(f"{grasp.name}: something slides in each of {GRASP_ATTEMPTS} attempts")
 
 
 def draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
