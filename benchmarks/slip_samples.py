@@ -56,6 +56,13 @@ class FingerSamples:
         """(n,) in a slip that is no micro-slip."""
         return (self.truth.codes == SLIDING) & ~self.in_micro_slips
 
+    def begins(self, early: float | None) -> np.ndarray:
+        """Return (n,) within some time from the onset of a slip [s]; all samples without one."""
+        inside = np.full(len(self.times), early is None)
+        for slip in self.truth.slips if early is not None else ():
+            inside |= (self.times >= slip.onset) & (self.times <= slip.onset + early)
+        return inside
+
     @property
     def still(self) -> np.ndarray:
         """(n,) held, and neither sliding nor creeping."""

@@ -401,9 +401,7 @@ def simulate(
     return simulation.recording()
 
 
-def without_slips(
-    grasp: Grasp, parameters: UskinParameters | None = None
-) -> tuple[Grasp, Plan]:
+def without_slips(grasp: Grasp, parameters: UskinParameters | None = None) -> tuple[Grasp, Plan]:
     """Return a grasp and its plan by which no finger slides 0.1 mm.
 
     Whatever made a finger slide is weaker when the grasp is made again, as `Plan.eased` says, and
