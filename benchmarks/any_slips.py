@@ -130,8 +130,8 @@ def row(part: str, name: str, metrics: SlipMetrics) -> str:
     numbers = " | ".join(f"{cell:.0f}" for cell in cells)
     auc = metrics.auc or float("nan")
     return (
-        f"| {part} | {name} | {numbers} | {rate:.2f} | {auc:.2f} | {metrics.n} | {metrics.n_over_1mm} | "
-        f"{metrics.held_minutes:.1f} |"
+        f"| {part} | {name} | {numbers} | {rate:.2f} | {auc:.2f} | {metrics.n} | "
+        f"{metrics.n_over_1mm} | {metrics.held_minutes:.1f} |"
     )
 
 
@@ -141,89 +141,73 @@ def best_threshold(counts: SlipCounts) -> int:
     return len(counts) - 1 if index is None else index
 
 
+Counts = dict[tuple[str, str], SlipCounts]
+"""Counts by part and by what decides."""
+
+
+def counts_of_hand(hand: int, model: Model, options: argparse.Namespace) -> Counts:
+    """Simulate a hand unless its recordings exist, calibrate the model, and test all parts."""
+    folder, seed, counts = options.folder / f"hand{hand}", seed_of(hand), Counts()
+    own = handling_of(folder / "handling", hand)
+    test = simulated(folder / "reference", repeats=options.repeats, profile="reference", seed=seed)
+    tests = {"reference": (own, test)}
+    if "slips" in options.parts:
+        tests["slips"] = own, simulated(folder / "slips", profile="slips", seed=seed)
+    if "others" in options.parts:
+        other = {"profile": "reference", "seed": seed + 1, "table": OTHER_OBJECTS}
+        tests["others"] = own, simulated(folder / "others", **other)
+    if "orca" in options.parts and hand < options.orca:
+        orca = {"profile": "reference", "seed": seed, "sensor": "orca-finger"}
+        handling = handling_of(folder / "orca-handling", hand, sensor="orca-finger")
+        tests["orca"] = handling, simulated(folder / "orca", **orca)
+    for part, (handling, recordings) in tests.items():
+        report = calibrate_with_report(model, handling)
+        print(f"<!-- hand {hand}, {part}: {report.sensors[0].slips[0].text()} -->")
+        at = np.array([threshold_of(report.model, recordings[0])])
+        counts[part, "any, calibrated"] = curve(recordings, model_scores, report.model, at)
+        for title, scores in RIVALS.items():
+            threshold = np.array([rival_threshold(handling, scores, report.model)])
+            counts[part, title] = curve(recordings, scores, report.model, threshold)
+        every = curve(recordings, model_scores, report.model, SLIP_THRESHOLDS)
+        best = every[best_threshold(every)].as_curve
+        counts[part, "any, best threshold for 1 on the test itself"] = best
+    return counts
+
+
+RIVALS = {
+    "change over 8 samples": rival_scores(over_lag),
+    "change from the start": rival_scores(from_start),
+}
+
+
 def main(options: argparse.Namespace) -> None:
     model = Model.load(options.model)
     totals: dict[tuple[str, str], list[SlipCounts]] = {}
-    print(
-        "| part | by | before 1 mm [%] | within 0.1 s [%] | false alarms a held minute | AUC | slips | over 1 mm | min |"
-    )
-    print("|---|---|--:|--:|--:|--:|--:|--:|--:|")
+    titles = ("part", "by", "before 1 mm [%]", "within 0.1 s [%]", "false alarms a held minute",
+              "AUC", "slips", "over 1 mm", "min")  # fmt: skip
+    print(f"| {' | '.join(titles)} |\n|---|---|{'--:|' * 7}")
     for hand in range(options.hands):
-        folder, seed = options.folder / f"hand{hand}", seed_of(hand)
-        handling = {"uskin": handling_of(folder / "handling", hand)}
-        tests = {
-            "reference": simulated(
-                folder / "reference", repeats=options.repeats, profile="reference", seed=seed
+        for (part, title), counts in counts_of_hand(hand, model, options).items():
+            totals.setdefault((part, title), []).append(counts[0])
+            print(row(f"{part}, hand {hand}", title, slip_metrics(counts[0])), flush=True)
+    for (part, title), counts in totals.items():
+        values = [slip_metrics(x) for x in counts]
+        ranges = ", ".join(
+            f"{min(v):.3g} to {max(v):.3g}"
+            for v in (
+                [m.before_1mm or 0.0 for m in values],
+                [m.incipient["0.1"] or 0.0 for m in values],
+                [m.false_alarms_per_minute["held"] or 0.0 for m in values],
             )
-        }
-        if "slips" in options.parts:
-            tests["slips"] = simulated(folder / "slips", profile="slips", seed=seed)
-        if "others" in options.parts:
-            tests["others"] = simulated(
-                folder / "others", profile="reference", seed=seed + 1, table=OTHER_OBJECTS
-            )
-        if "orca" in options.parts and hand < options.orca:
-            handling["orca"] = handling_of(folder / "orca-handling", hand, sensor="orca-finger")
-            tests["orca"] = simulated(
-                folder / "orca", profile="reference", seed=seed, sensor="orca-finger"
-            )
-        for name, own in handling.items():
-            report = calibrate_with_report(model, own)
-            for summary in report.sensors:
-                for slips in summary.slips:
-                    print(f"<!-- hand {hand}, {name}: {slips.text()} -->")
-            rivals = {
-                "change over 8 samples": rival_scores(over_lag),
-                "change from the start": rival_scores(from_start),
-            }
-            thresholds = {
-                title: rival_threshold(own, scores, report.model)
-                for title, scores in rivals.items()
-            }
-            for part, recordings in tests.items():
-                if (part == "orca") != (name == "orca"):
-                    continue
-                at = np.array([_threshold(report.model, recordings[0])])
-                rows = {"any, calibrated": curve(recordings, model_scores, report.model, at)}
-                for title, scores in rivals.items():
-                    rows[title] = curve(
-                        recordings, scores, report.model, np.array([thresholds[title]])
-                    )
-                every = curve(recordings, model_scores, report.model, SLIP_THRESHOLDS)
-                index = best_threshold(every)
-                rows["any, best threshold for 1 on the test itself"] = _at(every, index)
-                for title, counts in rows.items():
-                    totals.setdefault((part, title), []).append(counts)
-                    print(
-                        row(f"{part}, hand {hand}", title, slip_metrics(_first(counts))), flush=True
-                    )
-    if options.hands > 1:
-        for (part, title), counts in totals.items():
-            values = [slip_metrics(_first(x)) for x in counts]
-            pooled = slip_metrics(SlipCounts.total([_first(x) for x in counts]))
-            spread = ", ".join(
-                f"{min(v):.3g} to {max(v):.3g}"
-                for v in (
-                    [m.before_1mm or 0.0 for m in values],
-                    [m.incipient["0.1"] or 0.0 for m in values],
-                    [m.false_alarms_per_minute["held"] or 0.0 for m in values],
-                )
-            )
-            print(row(f"{part}, all {len(counts)}", f"{title} ({spread})", pooled))
+        )
+        pooled = slip_metrics(SlipCounts.total(counts))
+        print(row(f"{part}, all {len(counts)}", f"{title} ({ranges})", pooled))
 
 
-def _threshold(model: Model, recording: Recording) -> float:
+def threshold_of(model: Model, recording: Recording) -> float:
     name, module = next(iter(recording.modules.items()))
     slip = model.finger(name, module.sensor).slip
     return 1.0 if slip is None else slip.threshold
-
-
-def _at(counts: SlipCounts, index: int) -> SlipCounts:
-    return counts[index].as_curve
-
-
-def _first(counts: SlipCounts) -> SlipCounts:
-    return counts[0]
 
 
 if __name__ == "__main__":
