@@ -111,11 +111,8 @@ def curve(
     recordings: Sequence[Recording], scores: Scores, model: Model, at: np.ndarray
 ) -> SlipCounts:
     """Return the counts of all fingers at some thresholds."""
-    counts = []
-    for recording in recordings:
-        for decisions in scores(recording, model):
-            if decisions.truth is not None:
-                counts.append(SlipCounter.of(decisions).count(decisions.raised_at(at)))
+    decided = [own for recording in recordings for own in scores(recording, model)]
+    counts = [SlipCounter.of(own).count(own.raised_at(at)) for own in decided if own.truth]
     return SlipCounts.total(counts)
 
 
