@@ -208,7 +208,9 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         name = self.name or "the model"
         if self.handled_sensors:
             return f"{name}: no slips, as its handling leaves no threshold (holdfast teach)"
-        return f"{name}: no slips until calibrated (holdfast calibrate)"
+        if any(part.normalised for part in self.fingers.values()):
+            return f"{name}: no slips until calibrated (holdfast calibrate)"
+        return f"{name}: no slips until taught (holdfast teach)"
 
     def with_training(self, training: Training, blocks: Sequence[Digests]) -> Self:
         """Return the model with its provenance, and as many blocks as make it 20 % larger at most.
