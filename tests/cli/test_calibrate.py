@@ -100,6 +100,30 @@ def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypa
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.mcap", "live.json"]
 
 
+@pytest.mark.parametrize(
+    ("given", "opened"),
+    [
+        ("twin:", ("twin:?profile=handling", True)),
+        ("twin:?seed=3", ("twin:?seed=3&profile=handling", True)),
+        ("twin:?profile=gentle", ("twin:?profile=gentle", True)),
+        ("xela://auto", ("xela://auto", False)),
+    ],
+)
+def test_the_twin_handles_until_the_time_is_over(
+    capsys, folder, tmp_path, monkeypatch, given, opened
+):
+    seen = []
+
+    def open_source(uri, *, speed, loop):
+        seen.append((uri, loop))
+        raise ValueError("seen")
+
+    monkeypatch.setattr(sources, "open_source", open_source)
+    words = (folder / "model.json", given, "-o", tmp_path / "live.json")
+    assert run(capsys, "calibrate", *words)[0] == 2
+    assert seen == [opened]
+
+
 @pytest.mark.parametrize("verb", ["detect", "evaluate", "tune"])
 def test_on_another_sensor_it_says_so_and_uses_the_default(capsys, folder, mine, tmp_path, verb):
     part = mine.fingers["*"]
