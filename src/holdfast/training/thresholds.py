@@ -485,7 +485,9 @@ def with_slip_threshold(model: Model, point: CurvePoint | None) -> Model:
     """Return the model whose slip rules have a threshold; without slip rules if there is none."""
     if point is None:
         return model.changed(
-            lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
+            lambda part: part.without_thresholds("slip").without_heads(
+                "slip", "slip_changes", "slip_speed"
+            )
         )
     return model.with_threshold("slip", point.threshold, point.choice(SLIP_FALSE_ALARMS))
 
