@@ -4,9 +4,6 @@
     holdfast simulate slips/ --profile slips --cases 2 --repeats 4 --seed 0
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --own-features \
         -o src/holdfast/models/twin.json
-    holdfast simulate hands/ --randomize --measured scan,filter,noise,vibration \\
-        --repeats 150 --grasps 3 --seed 0
-    python benchmarks/train_slips.py any.json hands/ -o any.json
     python benchmarks/train_slips.py builtin:twin twin/ slips/ --only-speed \
         -o src/holdfast/models/twin.json
 
@@ -18,8 +15,8 @@ squares; else it has the features of stability. It is fitted without a
 fifth of the objects (or hands), five times; the threshold is the lowest with at most one false
 alarm a minute of all held time in the decisions about what was left out. Below the metrics of all
 recordings, by thresholds that were chosen without them, are those of each folder at the threshold
-of the model. A model of normalised features gets a head on them: those of a grasp are normalised by
-the other grasps of the same hand. Nothing here reads a real recording.
+of the model. Nothing here reads a real recording. The heads of `builtin:any` are those of
+`train_any_slips.py`.
 """
 
 import argparse
@@ -29,9 +26,8 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from hand_handling import NORMALISED_BY, moments_by, read_grasp
 
-from holdfast.detection import FeatureSpec, Head, Linear, Model, Tare
+from holdfast.detection import FeatureSpec, Head, Model, Tare
 from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.io import load_dataset
 from holdfast.metrics import score_recording
@@ -65,16 +61,12 @@ def main(options: argparse.Namespace) -> None:
     gathered = gather_samples(recordings, plan, engine)
     samples = gathered.of("slip")["*"]
     speeds = gathered.of("slip_speed").get("*")
-    if model.finger("*").normalised:
-        samples = normalised_samples(model, samples, recordings, options.normalised_by)
     print(f"{len(recordings)} recordings, {samples.n_positive} sliding samples")
     folds = folds_of_recordings(plan, recordings)
     units = plan.data_split.group_of
     held = [units[folds == fold].tolist() for fold in range(N_FOLDS)]
     squares = options.own_features
-    models = [
-        replaced(model, fitted(model, samples, speeds, left, features, squares)) for left in held
-    ]
+    models = [replaced(model, fitted(samples, speeds, left, features, squares)) for left in held]
     calls = ((models[fold], item) for fold, item in zip(folds, recordings, strict=True))
     curves = list(engine.map_ordered(curves_of, calls))
     chosen = choose_slip_threshold(curves, folds.tolist(), seed=0)
@@ -84,13 +76,9 @@ def main(options: argparse.Namespace) -> None:
     print_metrics(chosen.metrics.pooled)
     for folder in options.folders:
         print_folder(folder.name, recordings, curves, index)
-    complete = replaced(model, fitted(model, samples, speeds, [], features, squares))
+    complete = replaced(model, fitted(samples, speeds, [], features, squares))
     complete = with_slip_threshold(complete, chosen.point)
     print(msgspec.json.encode(complete.finger("*").slip.choice).decode())
-    if complete.finger("*").normalised:
-        # A model of any hand finds few slips of a hand outside its generator (docs/study/slips.md):
-        # it reports none until it is taught, and its probability ranks.
-        complete = complete.with_threshold("slip", 1.0)
     if out is not None:
         save(complete, recordings, out)
 
@@ -143,45 +131,20 @@ def folds_of_recordings(plan: SamplesPlan, recordings: Sequence[Recording]) -> n
     return np.array([indices[name] % N_FOLDS for name in names])
 
 
-def normalised_samples(
-    model: Model, samples: TargetSamples, recordings: Sequence[Recording], name: str
-) -> TargetSamples:
-    """Return the samples normalised by own handling, by its name; by default handling without."""
-    grasps = [read_grasp(model, recording) for recording in recordings]
-    default = model.finger("*").default_handling
-    moments = [moments or default for moments in moments_by(name, grasps)]
-    locations, scales = (
-        np.array(values)[samples.recordings] for values in zip(*moments, strict=True)
-    )
-    return replace(samples, features=(samples.features - locations) / scales)
-
-
 def fitted(
-    model: Model,
     samples: TargetSamples,
     speeds: TargetSamples | None,
     held: Collection[int],
     features: tuple[FeatureSpec, ...],
     squares: bool,
 ) -> list[Head]:
-    """Return the heads of slips fitted without held units, on the raw features.
-
-    Of a model of normalised features, mean and scale of the rule of slips are default handling.
-    """
-    part, is_any = model.finger("*"), all(spec.seconds for spec in features)
+    """Return the heads of slips fitted without held units."""
+    is_any = all(spec.seconds for spec in features)
     slip = fit_slip(samples, held, features, is_any=is_any, squares=squares)
     if slip is None:
         return []
     speed = fit_speed(speeds, held, features) if speeds and squares else None
-    others = [] if speed is None else [speed]
-    if not part.normalised:
-        return [slip, *others]
-    rule, columns = slip.rule, part.indices(part.stable)
-    location, scale = (values[columns] for values in part.default_handling)
-    weights = np.array(rule.weights[0]) / np.array(rule.scale)
-    intercept = rule.intercepts[0] - float(weights @ np.array(rule.mean))
-    linear = Linear.of(location, scale, weights, intercept, slope=rule.slope, offset=rule.offset)
-    return [msgspec.structs.replace(slip, rule=linear), *others]
+    return [slip] if speed is None else [slip, speed]
 
 
 def replaced(model: Model, heads: Sequence[Head]) -> Model:
@@ -236,7 +199,5 @@ if __name__ == "__main__":
     parser.add_argument("--own-features", action="store_true", help="SLIP_FEATURES, with squares")
     parser.add_argument("--without", nargs="*", default=[], metavar="TEXT",
                         help="leave out those of them whose names contain it")  # fmt: skip
-    parser.add_argument("--normalised-by", choices=NORMALISED_BY, default="others",
-                        help="of a model of normalised features")  # fmt: skip
     parser.add_argument("--only-speed", action="store_true", help="add the speed, no more")
     main(parser.parse_args())

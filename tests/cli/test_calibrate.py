@@ -66,9 +66,11 @@ def test_json(capsys, folder, tmp_path):
     (seen,) = report["sensors"]
     assert set(seen) == {
         "sensor", "fingers", "seconds", "load_change", "n_features", "n_changed", "activity",
-        "still", "before", "after",
+        "still", "before", "after", "slips",
     }  # fmt: skip
-    assert seen["after"]["alarms_per_minute"] <= 4
+    (slips,) = seen["slips"]
+    assert slips["n"] <= 4 * slips["minutes"]
+    assert len(slips["highest"]) == 5
     handling = Model.load(out).fingers["*"].handling["pad"]
     assert handling.thresholds["stable"] == seen["after"]["threshold"]
 
@@ -96,6 +98,30 @@ def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypa
     handling = Model.load(tmp_path / "live.json").fingers["*"].handling["pad"]
     assert handling.seconds == pytest.approx(10.8, abs=0.5)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.mcap", "live.json"]
+
+
+@pytest.mark.parametrize(
+    ("given", "opened"),
+    [
+        ("twin:", ("twin:?profile=handling", True)),
+        ("twin:?seed=3", ("twin:?seed=3&profile=handling", True)),
+        ("twin:?profile=gentle", ("twin:?profile=gentle", True)),
+        ("xela://auto", ("xela://auto", False)),
+    ],
+)
+def test_the_twin_handles_until_the_time_is_over(
+    capsys, folder, tmp_path, monkeypatch, given, opened
+):
+    seen = []
+
+    def open_source(uri, *, speed, loop):
+        seen.append((uri, loop))
+        raise ValueError("seen")
+
+    monkeypatch.setattr(sources, "open_source", open_source)
+    words = (folder / "model.json", given, "-o", tmp_path / "live.json")
+    assert run(capsys, "calibrate", *words)[0] == 2
+    assert seen == [opened]
 
 
 @pytest.mark.parametrize("verb", ["detect", "evaluate", "tune"])

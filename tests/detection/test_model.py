@@ -442,4 +442,5 @@ def test_a_model_that_reports_no_slip_says_what_to_do():
     assert not silent.reports_slips
     assert silent.has_slip_rule
     assert "holdfast teach" in silent.slip_advice
+    assert "holdfast calibrate" in Model.load("builtin:any").slip_advice
     assert reporting.slip_advice == model().slip_advice == ""

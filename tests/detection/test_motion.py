@@ -20,7 +20,6 @@ from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
     ANY_FEATURES,
     ANY_LAGS,
-    RELATIVE_KINDS,
     SLIP_FEATURES,
     FeatureSpec,
     kinds_of,
@@ -31,9 +30,10 @@ from holdfast.sensors import sensor as built_in
 
 RATE = 100.0
 NEEDED = ("changes", "seconds", "means", "ratios")
+MOTION_KINDS = kinds_of("change", "load", "second", "mean_second", "ratio")
 EVERY = tuple(
     FeatureSpec(kind, transform="relative", seconds=lag)
-    for kind in RELATIVE_KINDS
+    for kind in MOTION_KINDS
     for lag in ANY_LAGS
 )
 
@@ -67,7 +67,7 @@ def naive(readings, given, rate=RATE):
     averages = np.full((len(ANY_LAGS), 5), np.nan)
     least = math.inf, math.inf
     block, began = [], 0.0
-    rows = np.full((len(f), len(RELATIVE_KINDS) * len(ANY_LAGS)), np.nan)
+    rows = np.full((len(f), len(MOTION_KINDS) * len(ANY_LAGS)), np.nan)
     for k in range(len(f)):
         reference = least_loaded[k]
         load, taxel_load = norm(total[k] - total[reference]), norm(f[k] - f[reference])
@@ -224,7 +224,7 @@ def test_a_common_motion_of_the_taxels_leaves_no_residual():
     readings[50:] += np.linspace(0, 1, 40)[:, None, None]
     found = features_of(readings, given)
     change, residual = (
-        RELATIVE_KINDS.index(kind) * len(ANY_LAGS) for kind in ("force_change", "residual")
+        MOTION_KINDS.index(kind) * len(ANY_LAGS) for kind in ("force_change", "residual")
     )
     assert found[80, change] > -4
     assert found[80, residual] < -5
@@ -299,7 +299,7 @@ def test_a_gap_begins_anew_but_the_load_stays():
     found = features_of(readings, given, times=times)
     assert np.isnan(found[60]).all()
     assert np.isfinite(found[61]).all()
-    load = RELATIVE_KINDS.index("load_to_noise") * len(ANY_LAGS)
+    load = MOTION_KINDS.index("load_to_noise") * len(ANY_LAGS)
     assert found[61, load] == pytest.approx(found[59, load], abs=0.3)
 
 

@@ -74,6 +74,7 @@ static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
     finger->min_noise = in_counts ? 1 : (hf_real)1e-6;
     finger->step = in_counts ? 1 : HF_NAN;
     finger->rounding_noise = in_counts ? (hf_real)0.3 : HF_NAN;
+    finger->step_noise = in_counts ? (hf_real)0.3 : (hf_real)1e-6;
     const hf_real fields[4] = {0, 130, HF_INFINITY, 0};
     finger->max_field = fields[take(in, 1) % 4];
     finger->is_magnetic = finger->max_field > 0;
@@ -113,6 +114,7 @@ static void make_sizes(input *in, holdfast_hand *hand)
     hand->n_history = 14 + 2 * ((size_t)take(in, 1) % 20);
     hand->n_channels = take(in, 1) % 4 ? 4 : 1;
     hand->n_track = hand->n_lags ? 3 + (size_t)take(in, 1) % 60 : 1;
+    hand->n_slides = hand->n_lags && take(in, 1) % 2 ? hand->n_track : 0;
     for (size_t n = hand->n_history / 2; n > 0; n /= 2) {
         hand->n_levels += 1;
     }
@@ -124,6 +126,7 @@ static void make_sizes(input *in, holdfast_hand *hand)
     hand->alike = take(in, 1) % 2;
     hand->has_centres = take(in, 1) % 2;
     hand->has_ratios = take(in, 1) % 2;
+    hand->zero_unknown = take(in, 1) % 2;
 }
 
 /* Make heads and limits of a finger; the input then spoils some. */
@@ -205,7 +208,6 @@ static void run(input *in, const holdfast_hand *hand, size_t n_taxels)
     model.hold = (hf_real)(take(in, 1) % 2) / 10;
     model.has_filter = take(in, 1) % 2;
     model.switching = 15;
-    model.zero_unknown = take(in, 1) % 2;
     model.n_weights = 8 + (6 + 3) * (hand->n_features + 1);
     holdfast_rule *const rules = (holdfast_rule *)calloc(hand->n_fingers, sizeof *rules);
     hf_real *const weights = (hf_real *)calloc(model.n_weights, sizeof(hf_real));
@@ -258,7 +260,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     if (n_spoilt == 1) {
         size_t *const sizes[] = {&hand.n_fingers, &hand.n_lanes,   &hand.n_features,
                                  &hand.n_lags,    &hand.n_history, &hand.n_channels,
-                                 &hand.n_levels,  &hand.n_track};
+                                 &hand.n_levels,  &hand.n_track,   &hand.n_slides};
         spoil(&in, sizes, sizeof sizes / sizeof *sizes);
     }
     const bool is_small = hand.n_fingers <= MAX_LENGTH && hand.n_lanes <= MAX_LENGTH &&
@@ -294,6 +296,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lags[i].has_seconds = take(&in, 1) % 2;
         lags[i].has_means = take(&in, 1) % 2;
         lags[i].has_ratios = take(&in, 1) % 2;
+        lags[i].sliding = hand.n_slides ? take(&in, 8) : 0;
     }
     for (size_t i = 0; i < n_features && hand.n_history > 0; ++i) {
         make_feature(&in, &features[i], i % hand.n_features, &hand);

@@ -161,7 +161,7 @@ CHANGES = {
     "an array": (4, lambda _: np.zeros(4), "used: bytes expected"),
     "a byte less": (1, lambda data: data[:-1], "fingers: "),
     "a feature more": (2, lambda data: data + bytes(56), "features: "),
-    "a lag more": (3, lambda data: data + bytes(24), "lags: "),
+    "a lag more": (3, lambda data: data + bytes(32), "lags: "),
     "another baseline": (7, lambda data: 2 * data, "baseline: "),
 }
 

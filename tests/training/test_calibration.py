@@ -84,11 +84,6 @@ def test_the_summary_says_what_was_seen(model, calibrated):
     assert handling_of(calibrated.model).thresholds == after
 
 
-def test_a_model_that_reports_no_slip_reports_none_after_it(model):
-    silent = model.with_threshold("slip", 1.0)
-    assert not calibrate(silent, DATA).finger("thumb", PAD).slip.threshold < 1
-
-
 def test_once_more_gives_the_same_model(calibrated):
     again = calibrate_with_report(calibrated.model, DATA)
     assert again.model.digest == calibrated.model.digest
@@ -176,13 +171,28 @@ def test_it_warns_of_little_and_of_still_handling(model):
     assert len(report.warnings) == 2
 
 
-def test_false_alarms_set_the_threshold(model, calibrated):
-    alarms = 2.0
-    report = calibrate_with_report(model, DATA, false_alarms=alarms)
+def test_false_alarms_are_those_of_slips(model, calibrated):
+    report = calibrate_with_report(model, DATA, false_alarms=8.0)
     (summary,), (usual,) = report.sensors, calibrated.sensors
-    assert summary.after.alarms_per_minute <= alarms < usual.after.alarms_per_minute
-    assert summary.after.threshold < usual.after.threshold
+    assert summary.slips[0].threshold < usual.slips[0].threshold
+    assert summary.after.threshold == usual.after.threshold
     assert handling_of(report.model).location == handling_of(calibrated.model).location
+
+
+def test_handling_sets_the_threshold_of_slips(model, calibrated):
+    (slips,) = calibrated.sensors[0].slips
+    assert (model.reports_slips, calibrated.model.reports_slips) == (False, True)
+    assert slips.n <= slips.minutes < slips.at_most * slips.minutes
+    part = calibrated.model.finger("thumb", PAD)
+    assert part.slip.threshold == slips.threshold
+    assert part.slip.rule == model.finger("thumb").slip.rule
+    assert part.head("slip_changes").threshold == 1.0  # no handling began in contact
+
+
+def test_handling_that_begins_in_contact_sets_the_other_head(model):
+    cut = [dataclasses.replace(r.with_start(loaded=True)) for r in DATA]
+    (slips,) = calibrate_with_report(model, cut).sensors[0].slips
+    assert slips.head == ("slip_changes" if PAD.unit == "count" else "slip")
 
 
 def test_activity_is_in_default_scales(model):
@@ -225,7 +235,7 @@ def test_another_sensor_is_refused(model):
         calibrate(own, DATA)
 
 
-@pytest.mark.parametrize("wrong", [-1.0, np.nan, np.inf])
+@pytest.mark.parametrize("wrong", [-1.0, 0.0, np.nan, np.inf])
 def test_false_alarms_are_a_number(model, wrong):
     with pytest.raises(ValueError, match="false alarms"):
         calibrate(model, DATA, false_alarms=wrong)

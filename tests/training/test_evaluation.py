@@ -144,4 +144,7 @@ def test_models_of_before_know_whole_recordings(model, grasps):
 def test_a_model_that_reports_no_slip_is_scored_by_its_ranking():
     silent = Model.load("builtin:any").with_threshold("slip", 1.0)
     verdict = evaluate_recordings(silent, [sliding_recording(0)]).verdict
-    assert "Slips: none is reported until it is taught (holdfast teach); P(slip) has" in verdict
+    assert (
+        "Slips: none is reported until the model is calibrated (holdfast calibrate); P(slip) has"
+        in verdict
+    )

@@ -18,7 +18,8 @@ from holdfast.training.thresholds import (
     GraspingFinger,
     GraspingFingers,
     ThresholdReplay,
-    choose_handling_thresholds,
+    choose_handling_slips,
+    choose_stability_threshold,
 )
 
 from .build import tiny_recording
@@ -219,101 +220,144 @@ SPREAD = logistic(np.random.default_rng(0).normal(0.5, 1.0, size=3000))
 
 def test_a_share_of_the_handling_is_stable():
     held = handling(SPREAD)
-    point = choose_handling_thresholds(held, part())
-    assert point.keys() == {"stable"}
-    assert held.share("stable", point["stable"]) >= STABLE_SHARE
-    assert held.share("stable", point["stable"] * 1.2) < STABLE_SHARE
+    threshold = choose_stability_threshold(held, part())
+    assert held.share(threshold) >= STABLE_SHARE > held.share(threshold * 1.2)
 
 
 def test_the_hold_time_of_the_model_counts():
     steady, held = (
-        choose_handling_thresholds(handling(SPREAD, hold=s), part()) for s in (0.0, 0.1)
+        choose_stability_threshold(handling(SPREAD, hold=s), part()) for s in (0.0, 0.1)
     )
-    assert held["stable"] < steady["stable"]
+    assert held < steady
 
 
 @pytest.mark.parametrize("usual", [0.1, 0.4321])
 def test_it_is_at_most_the_threshold_of_the_model(usual):
     calm = logistic(np.random.default_rng(1).normal(6.0, 0.5, size=500))
-    assert choose_handling_thresholds(handling(calm), part(usual))["stable"] == usual
+    assert choose_stability_threshold(handling(calm), part(usual)) == usual
 
 
 @pytest.mark.parametrize(("usual", "highest"), [(0.1, 0.9), (0.95, 0.95)])
 def test_handling_that_moves_may_raise_it(usual, highest):
     calm = logistic(np.random.default_rng(1).normal(6.0, 0.5, size=500))
-    chosen = choose_handling_thresholds(handling(calm), part(usual), moves=True)
-    assert chosen["stable"] == pytest.approx(highest)
+    chosen = choose_stability_threshold(handling(calm), part(usual), moves=True)
+    assert chosen == pytest.approx(highest)
 
 
 def test_a_tenth_of_slip_does_not_move_it_to_the_slip():
     rng = np.random.default_rng(2)
     mixed = np.concatenate([rng.normal(1.0, 1.0, size=1700), rng.normal(-12.0, 1.0, size=300)])
-    point = choose_handling_thresholds(handling(logistic(mixed)), part())
-    assert np.mean(logistic(mixed[:1700]) >= point["stable"]) > 0.97
-    assert np.mean(logistic(mixed[1700:]) >= point["stable"]) == 0.0
-
-
-def test_slips_are_reported_seldom():
-    slips = logistic(np.random.default_rng(3).normal(-1.0, 1.0, size=2000))
-    held = handling(np.full(2000, 0.9), slips)
-    point = choose_handling_thresholds(held, part(slip=0.3))
-    assert held.share("slip", point["slip"]) <= 0.05 < held.share("slip", 0.3)
-    assert choose_handling_thresholds(held, part(slip=0.9))["slip"] == 0.9
-
-
-def test_a_slip_in_it_does_not_silence_the_slip_rule():
-    rng = np.random.default_rng(4)
-    slips = logistic(
-        np.concatenate([rng.normal(-2.0, 0.6, size=1700), rng.normal(4.0, 0.5, size=300)])
-    )
-    point = choose_handling_thresholds(handling(np.full(2000, 0.9), slips), part(slip=0.3))
-    assert np.mean(slips[1700:] >= point["slip"]) == 1.0
-
-
-def test_false_alarms_are_counted_per_minute_of_holding():
-    probability = np.full(6000, 0.9)  # one minute
-    probability[1000:1010], probability[2000:2010], probability[3000:3010] = 0.05, 0.2, 0.4
-    held = handling(probability)
-    assert [held.alarms_per_minute("stable", t) for t in (0.01, 0.1, 0.3, 0.5)] == [0, 1, 2, 3]
-    for alarms, low, high in ((0, 0.0, 0.05), (1, 0.05, 0.2), (2, 0.2, 0.4), (3, 0.4, 0.5)):
-        chosen = choose_handling_thresholds(held, part(), float(alarms))["stable"]
-        assert low < chosen <= high
+    threshold = choose_stability_threshold(handling(logistic(mixed)), part())
+    assert np.mean(logistic(mixed[:1700]) >= threshold) > 0.97
+    assert np.mean(logistic(mixed[1700:]) >= threshold) == 0.0
 
 
 def test_two_fingers_have_more_alarms_in_the_same_time():
     probability = np.full(6000, 0.9)
     probability[1000:1010] = 0.05
     both = GraspingFingers([held_finger(probability), held_finger(probability, name="index")])
-    assert (both.seconds, both.alarms_per_minute("stable", 0.5)) == (pytest.approx(60.0), 2.0)
+    assert (both.seconds, both.alarms_per_minute(0.5)) == (pytest.approx(60.0), 2.0)
     parts = GraspingFingers([held_finger(probability), held_finger(probability)])
-    assert (parts.seconds, parts.alarms_per_minute("stable", 0.5)) == (pytest.approx(120.0), 1.0)
+    assert (parts.seconds, parts.alarms_per_minute(0.5)) == (pytest.approx(120.0), 1.0)
 
 
 def test_an_alarm_at_the_release_is_right():
     states = np.repeat([STABLE, NO_CONTACT, STABLE, UNKNOWN], [1000, 500, 1000, 500])
     probability = np.full(3000, 0.9)
     probability[990:1000] = probability[1500:1510] = probability[2490:2500] = 0.01
-    assert held_finger(probability, states=states).n_alarms("stable", 0.5) == 0
+    assert held_finger(probability, states=states).n_alarms(0.5) == 0
     probability[500:510] = 0.01
-    assert held_finger(probability, states=states).n_alarms("stable", 0.5) == 1
+    assert held_finger(probability, states=states).n_alarms(0.5) == 1
 
 
-def test_reported_slips_are_counted_too():
-    slips = np.full(6000, 0.1)
-    slips[1000:1010], slips[2000:2010] = 0.8, 0.95
-    held = handling(np.full(6000, 0.9), slips)
-    assert [held.alarms_per_minute("slip", t) for t in (0.5, 0.9, 0.99)] == [2, 1, 0]
-    chosen = [choose_handling_thresholds(held, part(slip=0.5), n)["slip"] for n in (2.0, 1.0)]
-    assert chosen[0] == 0.5
-    assert 0.8 < chosen[1] <= 0.95
+# --- slips of own handling -------------------------------------------------------------------
 
 
-def test_too_many_alarms_are_refused():
-    probability = np.full(6000, 0.9)
-    probability[::100] = 1e-9
-    with pytest.raises(TrainingError, match="the least is 59"):
-        choose_handling_thresholds(handling(probability), part(), 1.0)
+def bumps(*heights):
+    """Return a minute of a low probability of a slip, with a short bump every 5 s."""
+    probability = np.full(6000, 0.05)
+    for k, height in enumerate(heights):
+        probability[500 * k + 100 : 500 * k + 105] = height
+    return probability
+
+
+def slips_of(probability, slip=None, false_alarms=1.0, **options):
+    made = finger_model()
+    made = made.with_heads(slip or slip_head(made.features, threshold=1.0))
+    held = handling(np.full(len(probability), 0.9), probability, **options)
+    return choose_handling_slips(held, made, false_alarms)
+
+
+@pytest.mark.parametrize(("rate", "low", "high"), [(0.5, 0.9, 0.96), (1, 0.8, 0.9), (2, 0.6, 0.8)])
+def test_the_threshold_is_the_lowest_with_few_enough_alarms(rate, low, high):
+    (chosen,) = slips_of(bumps(0.9, 0.8, 0.6), false_alarms=rate)
+    assert low < chosen.threshold <= high
+    assert (chosen.n, chosen.minutes) == (int(rate), pytest.approx(1.0))
+
+
+def test_a_quiet_threshold_below_an_alarming_one_is_not_taken():
+    """Two bumps that one long alarm joins at a low threshold are two at a higher one."""
+    probability = bumps(0.9, 0.9, 0.9)
+    (chosen,) = slips_of(probability)
+    assert chosen.threshold > 0.9
+
+
+def test_the_minutes_of_all_fingers_count():
+    made = finger_model().with_heads(slip_head(finger_model().features, threshold=1.0))
+    stable = np.full(6000, 0.9)
+    both = GraspingFingers(
+        [held_finger(stable, bumps(0.9)), held_finger(stable, bumps(0.8, 0.7), name="index")]
+    )
+    (chosen,) = choose_handling_slips(both, made, 1.0)
+    assert chosen.minutes == pytest.approx(2.0)
+    assert 0.7 < chosen.threshold <= 0.8  # two alarms in two minutes
+
+
+def test_the_interval_is_exact_and_shrinks_with_more_handling():
+    from scipy.stats import poisson
+
+    (chosen,) = slips_of(bumps(0.9, 0.8, 0.6), false_alarms=2.0)
+    assert poisson.cdf(chosen.n, chosen.at_most * chosen.minutes) == pytest.approx(0.05)
+    assert chosen.n / chosen.minutes < chosen.then_at_most < chosen.at_most
+    assert f"at most {chosen.at_most:.1f} a minute" in chosen.text()
+
+
+@pytest.mark.parametrize(
+    ("scores", "silent"), [((-2.0,) * 10, True), ((-2.0,) * 8 + (4.0,) * 2, False)]
+)
+def test_a_threshold_that_finds_hardly_a_slip_is_none(scores, silent):
+    """The five highest times are shown, one of each bump."""
+    made = finger_model()
+    head = msgspec.structs.replace(slip_head(made.features, threshold=1.0), slip_scores=scores)
+    heights = (0.95, 0.9, 0.85, 0.8, 0.75, 0.7)
+    (chosen,) = slips_of(bumps(*heights), head)
+    assert chosen.is_silent is silent
+    assert chosen.found == (0.0 if silent else 20.0)
+    assert [x.probability for x in chosen.highest] == list(heights[:5])
+    assert [x.time for x in chosen.highest] == pytest.approx([1.0, 6.0, 11.0, 16.0, 21.0], abs=0.05)
+    assert ("thumb 1.00 s" in chosen.text()) is silent
+
+
+def test_handling_full_of_slips_leaves_the_head_silent():
     slips = np.full(6000, 0.1)
     slips[100::100] = 1.0
-    with pytest.raises(TrainingError, match="least is 59"):
-        choose_handling_thresholds(handling(np.full(6000, 0.9), slips), part(slip=0.5), 0.0)
+    (chosen,) = slips_of(slips)
+    assert chosen.is_silent
+
+
+def test_each_form_of_zero_has_its_head():
+    made = finger_model()
+    both = made.with_heads(
+        slip_head(made.features, threshold=1.0),
+        msgspec.structs.replace(slip_head(made.features, threshold=1.0), name="slip_changes"),
+    )
+    stable = np.full(6000, 0.9)
+    fingers = [
+        held_finger(stable, bumps(0.9)),
+        replace(held_finger(stable, bumps(0.7, 0.6)), zero_unknown=True),
+    ]
+    slip, changes = choose_handling_slips(GraspingFingers(fingers), both, 1.0)
+    assert (slip.head, changes.head) == ("slip", "slip_changes")
+    assert slip.threshold < changes.threshold <= 0.7
+    (only,) = choose_handling_slips(GraspingFingers(fingers[:1]), both, 1.0)
+    assert only == slip

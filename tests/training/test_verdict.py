@@ -188,7 +188,7 @@ def test_what_slips_are_good_for(pooled, intervals, use):
 
 def test_a_model_that_reports_no_slip_ranks():
     found = verdict(with_slips(slips(found=0.0, rate=0.0)), reports_slips=False)
-    assert "holdfast teach" in found and found.endswith("0.90.")
+    assert "holdfast calibrate" in found and found.endswith("0.90.")
 
 
 def test_the_sentence_about_slips():

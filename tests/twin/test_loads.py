@@ -28,6 +28,14 @@ def test_a_pull_swells_and_fades():
     assert forces == pytest.approx([0.0, 3.0, 0.0, 0.0], abs=1e-4)
 
 
+def test_a_turn_turns_gravity_and_brings_it_back():
+    turn = [Load(LoadKind.TURN, 0.0, 2.0, np.pi / 2, (1.0, 0.0, 0.0))]
+    down = np.array([[0, 0, -9.81] - load_state(turn, time).acceleration for time in (0, 1, 2)])
+    np.testing.assert_allclose(np.linalg.norm(down, axis=1), 9.81)
+    np.testing.assert_allclose(down[1], [0, -9.81, 0], atol=1e-9)  # half way: on its side
+    np.testing.assert_allclose(down[[0, 2]], [[0, 0, -9.81]] * 2, atol=1e-9)
+
+
 @pytest.mark.parametrize(("kind", "rate"), [(LoadKind.TRANSPORT, 0.0), (LoadKind.SHAKE, 4.0)])
 def test_the_hand_rests_again_after_a_motion(kind, rate):
     """The integral of the acceleration, its speed, is 0 at the end."""

@@ -22,8 +22,14 @@ def test_coupled_is_the_reference_with_coupled_nodes_and_impacts():
     differ = {name for name in reference if coupled[name] != reference[name]}
     assert differ == {"name", "coupled", "impacts", "drawn_as"}
     assert coupled["drawn_as"] == "reference"  # so the disturbances of a seed are the same
-    others = [profile(name) for name in profiles() if name != "coupled"]
-    assert not any(other.coupled or other.impacts for other in others)
+    assert [name for name in profiles() if profile(name).coupled] == ["coupled"]
+
+
+def test_handling_is_pushed_for_as_much_of_the_hold_as_reference_is():
+    handling, reference = asdict(profile("handling")), asdict(profile("reference"))
+    same = {name for name in reference if handling[name] == reference[name]}
+    assert {"grip", "rest", "push_duration", "move_duration", "move_share", "push_depth"} <= same
+    assert [name for name in profiles() if profile(name).without_slips] == ["handling"]
 
 
 @pytest.mark.parametrize("name", ["", "Reference", "../profile", "reference.toml"])

@@ -3,11 +3,15 @@ import pytest
 from msgspec.structs import replace
 
 from holdfast.contact import Phase
+from holdfast.twin.impacts import Impact
+from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import (
     CLOSED_GAP,
     CLOSING_TIMEOUT,
+    EASED,
+    FIRMER,
     GRIP_CONFIRM_TIME,
     HAND_OVER_TIME,
     LOST_CONTACT_TIME,
@@ -237,3 +241,38 @@ def test_the_operator_holds_the_object_where_it_was():
     np.testing.assert_array_equal(positions[1], [1.0, 2.0, 3.0])
     np.testing.assert_array_equal(table.protocol.anchor[:3], [1.01, 2.0, 3.0])
     np.testing.assert_array_equal(table.protocol.anchor[3:], np.eye(3).ravel())
+
+
+def eased_plan():
+    push = Disturbance(2.0, 1.0, "up", 0, np.arange(1.0, 10.0))
+    tap = Impact("tap", 5.0, 5.1, 0.01, 0.02, np.ones(3), np.zeros(3), 0.0, 0.0)
+    turn = Load(LoadKind.TURN, 8.0, 1.0, 0.5)
+    return Plan(
+        profile("handling"), np.ones(4), 0.02, 1.0, 1.0, [push], impacts=[tap], loads=[turn]
+    )
+
+
+@pytest.mark.parametrize(
+    ("onset", "glitched", "factors"),
+    [
+        (2.0, False, (EASED, 1, 1, 1, 1)),
+        (3.3, False, (EASED, 1, 1, 1, 1)),  # just after the push
+        (5.05, False, (1, EASED, 1, 1, 1)),
+        (8.5, False, (1, 1, EASED, 1, 1)),
+        (8.5, True, (1, 1, EASED, EASED, 1)),
+        (12.0, True, (1, 1, 1, EASED, 1)),
+        (12.0, False, (1, 1, 1, 1, FIRMER)),
+    ],
+)
+def test_what_made_a_finger_slide_is_weaker_in_the_next_attempt(onset, glitched, factors):
+    plan, old = eased_plan().eased(np.array([onset]), np.array([glitched])), eased_plan()
+    sizes = (
+        plan.disturbances[0].parameters[6] / old.disturbances[0].parameters[6],
+        plan.impacts[0].size / old.impacts[0].size,
+        plan.loads[0].size / old.loads[0].size,
+        plan.glitch_size,
+        plan.grips[0],
+    )
+    assert sizes == pytest.approx(factors)
+    others = [k for k in range(9) if k != 6]
+    assert (plan.disturbances[0].parameters[others] == np.arange(1.0, 10.0)[others]).all()

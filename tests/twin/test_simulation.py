@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.detection import fingertip_force
+from holdfast.metrics.slip_truth import MIN_SLIP_DISTANCE, finger_slips
 from holdfast.twin import hand, simulation
 from holdfast.twin.objects import OTHER_OBJECTS, object_named
 from holdfast.twin.profile import profile
@@ -234,3 +235,26 @@ class TestGlitches:
         assert not none.truth.hand["set_point_error"].any()
         wanted = held.modules["thumb"].readings
         np.testing.assert_array_equal(none.modules["thumb"].readings, wanted)
+
+
+def test_in_handling_no_finger_slides():
+    """Pushes and pulls go on, though the first attempt slides."""
+    short = msgspec.structs.replace(profile("handling"), idle=(0.7, 0.8), hold=7.0)
+    first = made(Grasp("can", 2, 1, seed=9), msgspec.structs.replace(short, without_slips=False))
+    kept = made(Grasp("can", 2, 1, seed=9), short)
+
+    def distances(recording):
+        return [s.distance for f in FINGERS for s in finger_slips(recording.truth, f)]
+
+    assert max(distances(first)) > 1e-3
+    assert max(distances(kept), default=0.0) < MIN_SLIP_DISTANCE
+    pushed = [np.mean(r.truth.hand["phase"] == Phase.DISTURBED) for r in (first, kept)]
+    assert pushed[1] > 0.5 * pushed[0] > 0.05
+
+
+def test_what_always_slides_is_refused(monkeypatch):
+    monkeypatch.setattr(simulation, "MAX_EASED", 1)
+    monkeypatch.setattr(simulation, "GRASP_ATTEMPTS", 1)
+    short = msgspec.structs.replace(profile("handling"), idle=(0.7, 0.8), hold=7.0)
+    with pytest.raises(ValueError, match="can-case2-1: something slides in each of 1 attempts"):
+        made(Grasp("can", 2, 1, seed=9), short)

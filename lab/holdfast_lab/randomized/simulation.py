@@ -72,6 +72,7 @@ class RandomHold:
             the only grasp of a hand.
         measured: mechanisms of `drawing.MEASURED` with which the sensor is read and the arm
             moves as real ones do. All else that is drawn is the same with and without them.
+        whole: whether the recording begins with an open hand, whatever was drawn.
 
     Raises:
         ValueError: a mechanism is unknown.
@@ -83,6 +84,7 @@ class RandomHold:
     attempt: int = 0
     grasp: int | None = None
     measured: tuple[str, ...] = ()
+    whole: bool = False
 
     def __post_init__(self) -> None:
         if unknown := [name for name in self.measured if name not in MEASURED]:
@@ -328,7 +330,7 @@ class _Run:
         """Cut the beginning off half of the recordings, so that they begin in contact."""
         loaded = generator.random() < ranges()["sensor"]["loaded_start"]
         locked_at = self.protocol.locked_at
-        if not loaded or locked_at is None:
+        if not loaded or locked_at is None or self.hold.whole:
             return whole
         start = locked_at + float(generator.uniform(0.3, 2.0))
         modules = {

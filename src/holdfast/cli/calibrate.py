@@ -26,7 +26,7 @@ from holdfast.cli.terminal.console import (
 from holdfast.cli.terminal.control import handle_stop_signals
 from holdfast.cli.terminal.progress import progress
 
-HANDLING_SECONDS = 60.0
+HANDLING_SECONDS = 120.0
 """Time for which a live source is recorded, unless `--seconds` is given [s]."""
 
 
@@ -41,37 +41,38 @@ def calibrate(
     out: ModelOutput,
     *,
     false_alarms: Annotated[
-        float | None,
+        float,
         typer.Option(
-            help="Maximum number of alarms per minute of this handling; by default, 95 % of it is "
-            "STABLE."
+            help="Maximum number of false alarms of slips per minute of held time of a finger."
         ),
-    ] = None,
+    ] = 1.0,
     seconds: Annotated[
         float | None,
-        typer.Option(help="Time for which a live source is recorded [s].", show_default="60"),
+        typer.Option(help="Time for which a live source is recorded [s].", show_default="120"),
     ] = None,
     speed: Annotated[SpeedOption, RARE] = 1.0,
     start: StartOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Fit a model to a hand by a minute of handling, without labels.
+    """Fit a model to a hand by two minutes of handling, without labels.
 
-    Write a copy of the model in which every feature is normalised by what it is on this sensor
-    while it is used as usual: grasp, carry, turn, put down, without slip. The thresholds are set
-    by the same handling. Begin with an open hand, or give --in-contact. A tenth of the handling
-    may be slip; where it has labels, a hundredth. If the arm hardly moves, or the decisions about
-    this handling get worse, nothing is written without --force.
+    Write a copy of the model in which every feature of stability is normalised by what it is on
+    this sensor while it is used as usual: grasp, carry, turn, push, put down, without slip. The
+    same handling sets the thresholds: that of slips is the lowest with at most --false-alarms,
+    or the model reports no slip. Begin with an open hand, or give --in-contact. A tenth of the
+    handling may be slip for stability; where it has labels, a hundredth. If the arm hardly moves,
+    or the decisions about this handling get worse, nothing is written without --force.
 
-    DATA are recordings, or a live source such as xela://HOST:PORT or twin:?object=can, which is
-    recorded for --seconds and not kept. At least 5 s of holding are needed, 30 s are better.
+    DATA are recordings, or a live source such as xela://HOST:PORT or twin:, which is recorded for
+    --seconds and not kept; the twin handles one object after the other. At least 5 s of holding
+    are needed; two minutes with pushes that hold bound the false alarms.
     Models whose features are not normalised are refused: use builtin:any.
 
     Example:
       holdfast calibrate builtin:any handling/ -o mine.json
       holdfast calibrate builtin:any xela://auto -o mine.json --seconds 60
-      holdfast calibrate builtin:any handling/ -o mine.json --false-alarms 1
+      holdfast calibrate builtin:any 'twin:?seed=3' -o mine.json --speed 0
     """
     from holdfast.detection import Model
     from holdfast.devices import sources
@@ -90,7 +91,9 @@ def calibrate(
     check_speed(data, speed)
     recorded = None
     if live:
-        with handle_stop_signals() as stop, sources.open_source(data, speed=speed) as source:
+        data, is_twin = _handled(data)
+        opened = sources.open_source(data, speed=speed, loop=is_twin)
+        with handle_stop_signals() as stop, opened as source:
             # Ctrl-C before ends the wait for the source; from here on it ends the recording.
             stop.graceful = True
             duration = seconds or HANDLING_SECONDS
@@ -114,5 +117,20 @@ def calibrate(
     for summary in calibrated.sensors:
         print_paragraph(summary.text())
         print_table(("", "before", "after"), summary.rows())
+        for slips in summary.slips:
+            print_paragraph(slips.text())
         print_line()
     print_line(f"{out}: {calibrated.model.name or 'the model'}")
+
+
+def _handled(uri: str) -> tuple[str, bool]:
+    """Return the URI of a source, the twin's with its profile of handling, and whether it is one.
+
+    The twin grasps again until the time is over.
+    """
+    from holdfast.devices.uri import parse
+
+    scheme, address = parse(uri)
+    if scheme != "twin" or "profile" in address.parameters:
+        return uri, scheme == "twin"
+    return f"{uri}{'&' if address.parameters else '?'}profile=handling", True

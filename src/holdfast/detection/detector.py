@@ -16,7 +16,12 @@ import numpy.typing as npt
 from numpy import ndarray
 
 from holdfast.contact import ContactEvent, HandEstimate
-from holdfast.detection.kernel_config import packed, stream_config, with_thresholds
+from holdfast.detection.kernel_config import (
+    packed,
+    stable_thresholds,
+    stream_config,
+    with_thresholds,
+)
 from holdfast.detection.model import Model
 from holdfast.detection.plan import Start, StreamPlan, declared_baselines
 from holdfast.detection.traces import STATE_BY_CODE, Chunk, Detection, EstimateTypes, detection_of
@@ -94,6 +99,7 @@ class Detector:
         self._names = (*plan.fingers, HAND)
         # Only `set_thresholds` replaces the rules. `_readings` and `_present` are memory for
         # samples of other types.
+        self._model = model
         self._settings, self._rules, self._weights = model.config(self._plan)
         self._readings = np.zeros_like(self._plan.baseline)
         self._present = np.zeros(len(plan.fingers), dtype=np.bool_)
@@ -168,6 +174,10 @@ class Detector:
         if in_contact is not None:
             start = replace(self._plan.start, loaded=in_contact)
             self._plan = replace(self._plan, start=start)
+            # Which head decides about slips depends on the start; thresholds that were set stay.
+            thresholds = dict(enumerate(stable_thresholds(self._rules)))
+            self._settings, rules, self._weights = self._model.config(self._plan)
+            self._rules = with_thresholds(rules, thresholds)
         self._begin()
 
     def set_thresholds(self, thresholds: Mapping[str, float]) -> None:

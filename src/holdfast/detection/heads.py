@@ -155,16 +155,19 @@ def feature_rows(features: npt.ArrayLike, n_features: int) -> Array:
     return rows
 
 
-HeadName = Literal["stable", "slip", "slip_speed", "cause"]
+HeadName = Literal["stable", "slip", "slip_speed", "cause", "slip_changes"]
 Link = Literal["logit", "square", "softmax"]
 LINKS: dict[HeadName, Link] = {
     "stable": "logit",
     "slip": "logit",
     "slip_speed": "square",
     "cause": "softmax",
+    "slip_changes": "logit",
 }
 """Link of each head, in the order of the heads of a finger."""
 HEAD_NAMES = tuple(LINKS)
+KERNEL_HEADS = HEAD_NAMES[:4]
+"""Heads that decide about a finger; `slip_changes` takes the place of `slip`, or nothing."""
 MAX_WINDOW = 1 << 16
 """Maximum length of a window [samples]."""
 MAX_FEATURES = 1024
@@ -229,7 +232,8 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     compare it with the threshold only.
 
     Attributes:
-        name: what it answers: `stable`, `slip` (the finger slides), `slip_speed` or `cause`.
+        name: what it answers: `stable`, `slip` (the finger slides), `slip_speed`, `cause`; or
+            `slip_changes`, the head `slip` of a stream that begins in contact.
         link: `logit`, `square` or `softmax`.
         features: input of the rule, in its order.
         rule: maps features to z.
@@ -240,6 +244,8 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         classes: causes of the outputs of the rule, for the link `softmax`.
         highest: largest value, for the link `square` alone: that of the training.
         choice: how the threshold was chosen; None if it was given.
+        slip_scores: quantiles, evenly spaced from 0 to 1, over slips of the training that were left
+            out of it, of the highest smoothed z of each before it slid 1 mm.
 
     Raises:
         ModelError: a field is out of range, or the fields contradict each other.
@@ -255,6 +261,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
     classes: tuple[Cause, ...] = ()
     highest: float | None = None
     choice: Choice | None = None
+    slip_scores: tuple[float, ...] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         if self.name not in LINKS:
@@ -286,7 +293,7 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         for field in ("smoothing", "hold"):
             seconds = getattr(self, field)
             # Only slips have them: stability has its own filter and debouncing.
-            most = MAX_HEAD_DURATION if self.name == "slip" else 0.0
+            most = MAX_HEAD_DURATION if self.name in ("slip", "slip_changes") else 0.0
             if not 0 <= seconds <= most:
                 raise ModelError(
                     f"{self.name}: a {field} from 0 to {most:g} s expected, {seconds} given"
@@ -311,6 +318,13 @@ class Head(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         if self.rule.squares and self.name not in ("slip", "slip_speed"):
             raise ModelError(f"{self.name}: a rule without squares expected")
 
+    def share_found(self, threshold: float) -> float | None:
+        """Return the share of the training's slips that a threshold finds; None if not known."""
+        if self.slip_scores is msgspec.UNSET or not self.slip_scores:
+            return None
+        limit = math.log(threshold / (1 - threshold)) if 0 < threshold < 1 else math.inf
+        return sum(score >= limit for score in self.slip_scores) / len(self.slip_scores)
+
     def gain(self, rate: float) -> float:
         """Return the share of a new sample in the smoothed z at a rate [Hz]."""
         return 1.0 if self.smoothing == 0 else -math.expm1(-1.0 / (rate * self.smoothing))
@@ -331,7 +345,7 @@ class Handling(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
     """Own handling: what the features of a sensor are while its user holds objects, without slip.
 
     Attributes:
-        location: of each feature of `FingerModel.features`.
+        location: of each feature of the head `stable`.
         scale: of each of them, above 0.
         seconds: held time of one finger on which it rests [s].
         thresholds: by the name of the head; other heads keep that of the model.
@@ -375,8 +389,8 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             `contact_threshold` is None.
         contact_load: threshold of contact on the load, as a multiple of the noise of the stream,
             for relative features; used instead of the others if it is given.
-        normalised: `stable` and `slip` work on features that are normalised by own handling. Their
-            means and scales are then those of default handling; `for_sensor` replaces them.
+        normalised: `stable` works on features that are normalised by own handling. Its means and
+            scales are then those of default handling; `for_sensor` replaces them.
         handling: own handling by the name of the sensor, of a model that is normalised.
 
     Raises:
@@ -414,7 +428,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         if self.handling and not self.normalised:
             raise ModelError("own handling given; it needs a model with normalised features")
         check_limit("sensors with own handling", len(self.handling), MAX_FINGERS)
-        n_features = len(self.features)
+        n_features = len(self.stable.features)
         for name, handling in self.handling.items():
             if len(handling.location) != n_features:
                 raise ModelError(
@@ -461,15 +475,18 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         heads = tuple(head for head in self.heads if head.name not in names)
         return msgspec.structs.replace(self, heads=heads)
 
+    def deciding(self, name: HeadName, *, zero_unknown: bool) -> Head | None:
+        """Return the head that answers a question; None if there is none.
+
+        Where the readings without contact are not known, `slip_changes` takes the place of `slip`.
+        """
+        changes = self.head("slip_changes") if zero_unknown and name == "slip" else None
+        return self.head(name) if changes is None else changes
+
     @property
     def default_handling(self) -> tuple[Array, Array]:
-        """Location and scale of `features` without own handling: those of `stable`, else `slip`."""
-        location, scale = np.zeros(len(self.features)), np.ones(len(self.features))
-        # `stable` last: where both use a feature, its moments count.
-        for head in (self.slip, self.stable):
-            if head is not None:
-                location[self.indices(head)], scale[self.indices(head)] = head.rule.moments
-        return location, scale
+        """Location and scale of the features of `stable` without own handling."""
+        return self.stable.rule.moments
 
     def for_sensor(self, sensor_name: str) -> "FingerModel":
         """Return the model with the own handling of a sensor, if it has any, in its heads."""
@@ -480,23 +497,31 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         """Return the model with own handling in its heads.
 
         With location l_j and scale s_j of the sensor, u_j = (phi_j - l_j) / s_j takes the place of
-        (phi_j - mean_j) / scale_j in `stable` and `slip`. Means and scales of the other heads are
-        of unstable or sliding samples, so they move as the default handling does.
+        (phi_j - mean_j) / scale_j in `stable`. Means and scales of `cause` are of unstable samples,
+        so they move as the default handling does. Heads of slips read the features as they are:
+        own handling sets their thresholds alone.
         """
-        before = self.default_handling
-        after = np.array(handling.location), np.array(handling.scale)
+        before, after = self.default_handling, np.array((handling.location, handling.scale))
         heads = []
         for head in self.heads:
-            columns = self.indices(head)
-            location, scale = after[0][columns], after[1][columns]
-            if head.name not in ("stable", "slip"):  # the shift and stretch of the handling
-                mean, own_scale = head.rule.moments
-                ratio = scale / before[1][columns]
-                location = location + ratio * (mean - before[0][columns])
-                scale = ratio * own_scale
+            moments = head.rule.moments
+            if head.name == "stable":
+                moments = after[0], after[1]
+            elif head.name == "cause":  # the shift and stretch of the handling
+                moments = self._moved(head, before, after)
             threshold = handling.thresholds.get(head.name, head.threshold)
-            heads.append(head.normalised_by(location, scale).at(threshold, head.choice))
+            heads.append(head.normalised_by(*moments).at(threshold, head.choice))
         return msgspec.structs.replace(self, heads=tuple(heads), handling={})
+
+    def _moved(self, head: Head, before: tuple[Array, Array], after: Array) -> tuple[Array, Array]:
+        """Return mean and scale of a head, moved with those features that `stable` has, too."""
+        mean, scale = head.rule.moments
+        columns, n = self.indices(head), len(before[0])
+        own = columns < n  # the features of `stable` are the first
+        ratio = after[1][columns[own]] / before[1][columns[own]]
+        mean[own] = after[0][columns[own]] + ratio * (mean[own] - before[0][columns[own]])
+        scale[own] *= ratio
+        return mean, scale
 
     def without_thresholds(self, name: HeadName) -> "FingerModel":
         """Return the model whose own handling does not set the threshold of a head."""

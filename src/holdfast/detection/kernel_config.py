@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from holdfast.contact import CAUSES, SLIP_CODE
-from holdfast.detection.heads import HEAD_NAMES, Debounce, FingerModel, Head
+from holdfast.detection.heads import KERNEL_HEADS, Debounce, FingerModel, Head
 from holdfast.detection.plan import StreamPlan
-from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec
+from holdfast.detection.specs import KINDS, SCOPES, TRANSFORMS, FeatureSpec, kinds_of
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import Structs, structs
 from holdfast.sensors import Sensor
@@ -132,8 +132,9 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
     noise_seconds = plan.tare.seconds if plan.tare.kind == "seconds" else NOISE_SECONDS
     if plan.start.loaded:
         noise_seconds = LOADED_NOISE_SECONDS
-    # A second difference looks back by two lags.
-    reach = max([lag["samples"] * (1 + lag["has_seconds"]) for lag in lags], default=0)
+    samples = {lag["seconds"]: lag["samples"] for lag in lags}
+    reach = max((samples[s.seconds] * KINDS[s.kind].reach for s in specs if s.seconds), default=0)
+    n_track = max(RING_SPARE * reach + 1, 3 if lags else 1)
     return {
         "n_fingers": len(features),
         "n_features": plan.width,
@@ -143,7 +144,8 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         if any(KINDS[spec.kind].of_components for spec in specs)
         else 1,
         "n_levels": n_levels(n_history),
-        "n_track": RING_SPARE * reach + 1,
+        "n_track": n_track,
+        "n_slides": n_track if any(lag["sliding"] for lag in lags) else 0,
         "period": 1.0 / plan.rate,
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
@@ -152,6 +154,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
         "has_ratios": any(lag["has_ratios"] for lag in lags),
+        "zero_unknown": plan.zero_unknown,
     }
 
 
@@ -175,6 +178,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "min_noise": float(noise * np.sqrt(n_used)),
         "rounding_noise": noise if sensor.unit == "count" else np.nan,
         "step": sensor.step or (1.0 if sensor.unit == "count" else np.nan),
+        "step_noise": noise if sensor.step is None else sensor.step * COUNT_NOISE,
         "is_magnetic": bool(sensor.magnetic),
         "rests_at_zero": bool(sensor.rests_at_zero),
         # The load of the start, when it goes, may look like a field.
@@ -212,7 +216,8 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
 
 
 def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
-    families = {KINDS[spec.kind].family for spec in specs if spec.seconds == seconds}
+    kinds = {spec.kind for spec in specs if spec.seconds == seconds}
+    families = {KINDS[kind].family for kind in kinds}
     return {
         "samples": max(1, round(seconds * rate)),
         "seconds": seconds,
@@ -220,6 +225,7 @@ def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
         "has_seconds": not families.isdisjoint(("second", "mean_second")),
         "has_means": "mean_second" in families,
         "has_ratios": "ratio" in families,
+        "sliding": sum(1 << i for i, kind in enumerate(kinds_of("sliding")) if kind in kinds),
     }
 
 
@@ -252,8 +258,8 @@ def model_config(
     heads: list[Row] = []
     numbers = [np.empty(0)]
     for part in parts:
-        for name in HEAD_NAMES:
-            head = part.head(name)
+        for name in KERNEL_HEADS:
+            head = part.deciding(name, zero_unknown=plan.zero_unknown)
             rows, squares, causes = _numbers(part, head)
             heads.append(
                 {
@@ -279,20 +285,25 @@ def model_config(
         "hold": debounce.hold,
         "has_filter": debounce.switching_rate > 0,
         "switching": debounce.switching_rate,
-        "zero_unknown": plan.zero_unknown,
     }
-    by_finger = structs("holdfast_head", heads).reshape(len(parts), len(HEAD_NAMES))
+    by_finger = structs("holdfast_head", heads).reshape(len(parts), len(KERNEL_HEADS))
     rules = [_contact(part) | {"heads": own} for part, own in zip(parts, by_finger, strict=True)]
     return ModelConfig(
         structs("holdfast_model", [settings]), structs("holdfast_rule", rules), weights
     )
 
 
+def stable_thresholds(rules: Structs) -> list[float]:
+    """Return the threshold of stability of each finger."""
+    thresholds: list[float] = rules["heads"][:, KERNEL_HEADS.index("stable")]["threshold"].tolist()
+    return thresholds
+
+
 def with_thresholds(rules: Structs, thresholds: Mapping[int, float]) -> Structs:
     """Return the rules with other thresholds of stability, by the index of the finger."""
     changed = rules.copy()
     for finger, threshold in thresholds.items():
-        changed["heads"][finger, HEAD_NAMES.index("stable")]["threshold"] = threshold
+        changed["heads"][finger, KERNEL_HEADS.index("stable")]["threshold"] = threshold
     return changed
 
 
@@ -318,7 +329,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
         return np.zeros((0, 1)), np.zeros((0, 0)), []
     columns = part.indices(head)
     # A head reads the features up to the last that it uses; those of slips read all.
-    is_slip = head.name in ("slip", "slip_speed")
+    is_slip = head.name in ("slip", "slip_speed", "slip_changes")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
     # A row is the intercept, then a weight for each feature: 0 for those that it does not use.
     rows = np.zeros((head.rule.n_outputs, n + 1))

@@ -193,19 +193,24 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def reports_slips(self) -> bool:
-        """Whether the model ever reports a slip: a threshold of 1 leaves it to `teach`."""
-        heads = [part.slip for part in self.fingers.values()]
-        return any(head is not None and head.threshold < 1 for head in heads)
+        """Whether the model ever reports a slip: a threshold of 1 leaves it to `calibrate`."""
+        names: tuple[HeadName, ...] = ("slip", "slip_changes")
+        parts = self.fingers.values()
+        own = [handling.thresholds for part in parts for handling in part.handling.values()]
+        own += [{head.name: head.threshold for head in part.heads} for part in parts]
+        return any(thresholds.get(name, 1.0) < 1 for thresholds in own for name in names)
 
     @property
     def slip_advice(self) -> str:
-        """What its slip rule is good for if it reports no slip; empty without such a rule."""
+        """What sets the threshold of slips if the model reports none; empty without such a rule."""
         if self.reports_slips or not self.has_slip_rule:
             return ""
-        return (
-            f"{self.name or 'the model'} reports no slip until it is taught on this hand (holdfast "
-            "teach): slip_probability is a ranking, and UNSTABLE a disturbance, no sign of a slip"
-        )
+        name = self.name or "the model"
+        if self.handled_sensors:
+            return f"{name}: no slips, as its handling leaves no threshold (holdfast teach)"
+        if any(part.normalised for part in self.fingers.values()):
+            return f"{name}: no slips until calibrated (holdfast calibrate)"
+        return f"{name}: no slips until taught (holdfast teach)"
 
     def with_training(self, training: Training, blocks: Sequence[Digests]) -> Self:
         """Return the model with its provenance, and as many blocks as make it 20 % larger at most.

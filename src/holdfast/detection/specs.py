@@ -9,7 +9,7 @@ import numpy as np
 DEFAULT_WINDOW = 14
 """N_w, the number of samples in the window, as in most of the paper."""
 
-Family = Literal["force", "change", "load", "second", "mean_second", "ratio"]
+Family = Literal["force", "change", "load", "second", "mean_second", "ratio", "sliding"]
 
 
 class FeatureKind(NamedTuple):
@@ -19,12 +19,14 @@ class FeatureKind(NamedTuple):
         name: in model files and on the command line.
         family: what the kernel computes together. `force` comes from the history of the force
             (`hf_force_feature` of `kernel/stream.c`); all others from single taxels
-            (`kernel/motion.c`), which computes at a lag only the families that it needs.
+            (`kernel/motion.c`, and `kernel/sliding.c` for `sliding`), which computes at a lag only
+            the families that it needs, and of `sliding` the kinds.
         window: `sample` for kinds of one sample, `window` for those of N_w samples, `lag` for those
             that look back by seconds.
         min_taxels: number of taxels from which a sensor has it: 2 for kinds that compare taxels.
         transforms: that a feature of this kind may have.
         of_components: whether it needs Haar windows of F_x, F_y and F_z, beside that of F_a.
+        reach: by how many times the lag it looks back.
         by_name: whether `parse_features` accepts it; the others are in named lists only.
     """
 
@@ -34,13 +36,14 @@ class FeatureKind(NamedTuple):
     min_taxels: int = 1
     transforms: tuple[str, ...] = ("none", "log")
     of_components: bool = False
+    reach: int = 1
     by_name: bool = True
 
 
-def _over_lag(name: str, family: Family, min_taxels: int = 1) -> FeatureKind:
+def _over_lag(name: str, family: Family, min_taxels: int = 1, reach: int = 1) -> FeatureKind:
     # A value over a lag has a unit and depends on the hand: only its ratio to the load or to the
     # noise, whose logarithm is `relative`, carries over.
-    return FeatureKind(name, family, "lag", min_taxels, ("relative",), by_name=False)
+    return FeatureKind(name, family, "lag", min_taxels, ("relative",), reach=reach, by_name=False)
 
 
 KINDS = {
@@ -73,22 +76,49 @@ KINDS = {
         # Second differences of the taxels at a spacing: of all; weighted by their share of the
         # load, and the part of this across the normal; against their common motion; the largest
         # of loaded taxels.
-        _over_lag("second_all", "second"),
-        _over_lag("second_shared", "second", 2),
-        _over_lag("second_shear", "second"),
-        _over_lag("second_own", "second", 2),
-        _over_lag("second_top", "second", 2),
+        _over_lag("second_all", "second", reach=2),
+        _over_lag("second_shared", "second", 2, reach=2),
+        _over_lag("second_shear", "second", reach=2),
+        _over_lag("second_own", "second", 2, reach=2),
+        _over_lag("second_top", "second", 2, reach=2),
         # The same, averaged over the last samples.
-        _over_lag("mean_second_all", "mean_second"),
-        _over_lag("mean_second_shared", "mean_second", 2),
-        _over_lag("mean_second_shear", "mean_second"),
-        _over_lag("mean_second_own", "mean_second", 2),
-        _over_lag("mean_second_top", "mean_second", 2),
+        _over_lag("mean_second_all", "mean_second", reach=2),
+        _over_lag("mean_second_shared", "mean_second", 2, reach=2),
+        _over_lag("mean_second_shear", "mean_second", reach=2),
+        _over_lag("mean_second_own", "mean_second", 2, reach=2),
+        _over_lag("mean_second_top", "mean_second", 2, reach=2),
         # The signed change of either force as a share of the normal force, and the change of the
         # ratio of tangential to normal force.
         _over_lag("shear_gain", "ratio"),
         _over_lag("normal_gain", "ratio"),
         _over_lag("ratio_gain", "ratio"),
+        # Of sliding, with the equations of docs/details/models.md: the friction of the finger
+        # and of its taxels, the force, and the friction beside the largest of the last seconds.
+        _over_lag("friction", "sliding", reach=0),
+        _over_lag("taxel_friction", "sliding", reach=0),
+        _over_lag("force_to_noise", "sliding", reach=0),
+        _over_lag("friction_margin", "sliding", reach=0),
+        # Changes of the force by the load, of both frictions, along the shear, and of the centre.
+        _over_lag("shear_by_load", "sliding"),
+        _over_lag("normal_by_load", "sliding"),
+        _over_lag("force_by_load", "sliding"),
+        _over_lag("friction_rise", "sliding"),
+        _over_lag("taxel_friction_rise", "sliding"),
+        _over_lag("alignment", "sliding"),
+        _over_lag("centre_shift", "sliding", 2),
+        # How differently the taxels change, and the share of them whose shear falls or rises.
+        _over_lag("divergence", "sliding", 2),
+        _over_lag("relative_divergence", "sliding", 2),
+        _over_lag("normal_divergence", "sliding"),
+        _over_lag("falling_share", "sliding"),
+        _over_lag("rising_share", "sliding"),
+        # Energies of fast changes, where the lag is the spacing: of first differences of shear,
+        # and of second ones of shear, normal force, both, and shear about its mean.
+        *(
+            _over_lag(f"fast_{what}{over}", "sliding", 2 if what == "own" else 1, reach=2)
+            for over in ("", "_30ms", "_100ms", "_400ms")
+            for what in ("step", "shear", "normal", "all", "own")
+        ),
     )
 }
 """All kinds by name. The order is that of the numbers in `kernel/holdfast.h`: the code of a kind is
@@ -137,7 +167,8 @@ class FeatureSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         transform: `none`; `log`, log(sqrt(value^2 + floor^2)); or `noise`, the logarithm of the
             ratio of sigma to the sigma of the sensor's noise alone; or, for the relative kinds
             only, `relative`: the logarithm of the ratio to the load, that of the ratio to the
-            noise for second differences, or the share itself for the last three.
+            noise for second differences, or the share itself for the ratios, and for those kinds
+            of sliding that have a sign or a bound.
         scope: `finger`; or `hand`, the largest value of all fingers of the hand.
         floor: value that keeps the logarithm of `log` finite [unit of the readings].
 
@@ -257,6 +288,42 @@ TAUGHT_FEATURES = (
 )
 """Features of a head that is taught by slips of the user's own hand: every family without a unit.
 The lags of `any` are among them, because the model that keeps its other heads computes those."""
+
+
+SLIDING_LAGS = (0.014, 0.03, 0.067, 0.133, 0.267, 0.533)
+"""Lags of changes in features of sliding [s]; the first is the spacing of fast changes, too."""
+_SLIDING = kinds_of("sliding")
+_STATES, _MARGIN, _CHANGES, _FAST = _SLIDING[:3], _SLIDING[3], _SLIDING[4:16], _SLIDING[16:]
+
+
+def _sliding(**lags: Sequence[float]) -> tuple[FeatureSpec, ...]:
+    return tuple(
+        FeatureSpec(kind, transform="relative", seconds=seconds)
+        for kind in _SLIDING
+        for seconds in lags.get(kind, ())
+    )
+
+
+SLIDING_FEATURES = _sliding(
+    **dict.fromkeys((*_STATES, *_FAST), SLIDING_LAGS[:1]),
+    **{_MARGIN: (0.5, 2.0)},
+    **dict.fromkeys(_CHANGES, SLIDING_LAGS),
+)
+"""All features of sliding."""
+
+SLIDING_CHOICE = _sliding(
+    force_to_noise=(0.014,), friction_margin=(0.5, 2.0), shear_by_load=(0.03, 0.067, 0.133, 0.533),
+    force_by_load=(0.533,), friction_rise=(0.267,), taxel_friction_rise=(0.067, 0.267),
+    alignment=(0.133,), centre_shift=(0.267, 0.533), divergence=(0.133, 0.267, 0.533),
+    relative_divergence=(0.03,), falling_share=(0.067, 0.133, 0.533),
+    rising_share=(0.067, 0.133, 0.533), fast_step_30ms=(0.014,), fast_shear_30ms=(0.014,),
+    fast_all_30ms=(0.014,), fast_own_30ms=(0.014,), fast_step_400ms=(0.014,),
+    fast_shear_400ms=(0.014,), fast_all_400ms=(0.014,), fast_own_400ms=(0.014,),
+)  # fmt: skip
+"""Those of a linear head, from 450 hands: the ones with the least weights were left out in turn."""
+
+ZERO_KINDS = (*_STATES, _MARGIN)
+"""Kinds that mean nothing where the readings without contact are not known."""
 
 
 NAMED_FEATURES = {"holdfast": HOLDFAST_FEATURES, "any": ANY_FEATURES}

@@ -91,9 +91,9 @@ HF_API int32_t holdfast_detect(
             hf_start_decision(decision);
         }
         if (present[i] && f.values->reason == HOLDFAST_READY) {
-            contact = hf_find_contact(&f, rule, decision, model->zero_unknown, time);
+            contact = hf_find_contact(&f, rule, decision, model->hand->zero_unknown, time);
             if (f.state->is_rezeroed) { /* until the next touch; of a start in contact, no zero */
-                f.state->is_rezeroed = !model->zero_unknown &&
+                f.state->is_rezeroed = !model->hand->zero_unknown &&
                                        (contact == HF_WITHOUT_CONTACT || !hf_touches_rezeroed(&f));
                 contact = f.state->is_rezeroed ? HF_WITHOUT_CONTACT : contact;
                 f.values->faults |= f.state->is_rezeroed ? HOLDFAST_REZEROED : 0;

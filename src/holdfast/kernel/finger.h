@@ -51,6 +51,7 @@ typedef struct {
     hf_real *reference;
     hf_real *changes;
     hf_real *pressed; /* (n) */
+    hf_real *shares;  /* (4, n) */
     hf_real *powers;  /* (2, n) */
     holdfast_taxel *taxels;
     holdfast_mask *masks;
@@ -60,6 +61,7 @@ typedef struct {
     hf_real *blocks;
     holdfast_track *track;
     hf_real *taxel_forces; /* of the first sample in the ring */
+    hf_real *slides;       /* likewise */
     hf_real *relative;
     hf_real *averages;
 } hf_finger;
@@ -300,6 +302,15 @@ enum { HF_FIRST_TOUCH, HF_ALIKE, HF_OPPOSED };
 /* motion.c. Not inline: gcc computes them 4 % slower as a part of their caller. */
 HF_SHARED HF_APART hf_real hf_append_taxels(const hf_finger *f, double time, hf_real force[3]);
 HF_SHARED HF_APART void hf_update_motion(const hf_finger *f, double time);
+
+/* sliding.c */
+HF_SHARED HF_APART void hf_append_slide(
+    const hf_finger *f, size_t now, double time, hf_real step);
+HF_SHARED HF_APART void hf_fill_slide(
+    const hf_finger *f, const holdfast_lag *lag, size_t now, size_t then, hf_real *out);
+HF_SHARED HF_APART void hf_fill_energies(
+    const hf_finger *f, uint64_t kinds, hf_second at, hf_real step, hf_real *averages,
+    hf_real *out);
 
 /* stream.c */
 HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *memory, size_t index);

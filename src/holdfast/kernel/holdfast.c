@@ -18,6 +18,7 @@
 #include "field.c"
 #include "masks.c"
 #include "motion.c"
+#include "sliding.c"
 #include "stream.c"
 #include "tables.c"
 

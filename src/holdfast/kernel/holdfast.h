@@ -11,7 +11,8 @@
  *              -> changes and faulty taxels (faults.c)
  *              -> tare and noise (tare.c) -> magnetic field taken out (field.c)
  *              -> faulty taxels filled in (masks.c)
- *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c)
+ *              -> fingertip force (taxels.c) -> Haar window (window.c), motion (motion.c), sliding
+ *                 (sliding.c)
  *              -> features (stream.c)
  *              -> contact? (contact.c) -> heads: stable, slip, slip_speed, cause (heads.c)
  *              -> forward filter, hysteresis, hold, minimum duration (decision.c)
@@ -109,6 +110,7 @@ typedef double hf_real;
 #define HF_N_CHANNELS(hand) ((void)(hand), (size_t)HOLDFAST_N_CHANNELS)
 #define HF_N_LEVELS(hand) ((void)(hand), (size_t)HOLDFAST_N_LEVELS)
 #define HF_N_TRACK(hand) ((void)(hand), (size_t)HOLDFAST_N_TRACK)
+#define HF_N_SLIDES(hand) ((void)(hand), (size_t)HOLDFAST_N_SLIDES)
 #define HF_ARRAY(type, name, length) type name[length]
 #else
 #define HF_N_FINGERS(hand) ((hand)->n_fingers)
@@ -119,6 +121,7 @@ typedef double hf_real;
 #define HF_N_CHANNELS(hand) ((hand)->n_channels)
 #define HF_N_LEVELS(hand) ((hand)->n_levels)
 #define HF_N_TRACK(hand) ((hand)->n_track)
+#define HF_N_SLIDES(hand) ((hand)->n_slides)
 #define HF_ARRAY(type, name, length) type *name
 #endif
 
@@ -182,9 +185,9 @@ enum {
     HOLDFAST_SIGMA = 5,     /* equation 2, of F_a */
     HOLDFAST_SIGMA_XYZ = 6, /* root of the sum of the squared sigmas of F_x, F_y and F_z */
     HOLDFAST_CHANGE = 7,    /* |F_tip(k) - F_tip(k - N_w + 1)| */
-    /* ... and relative ones, over a lag (motion.c). */
+    /* ... and relative ones, over a lag (motion.c, sliding.c). */
     HOLDFAST_FIRST_RELATIVE = 8,
-    HOLDFAST_N_RELATIVE = 20
+    HOLDFAST_N_RELATIVE = 56
 };
 
 /* Relative features: HOLDFAST_FIRST_RELATIVE plus one of these. */
@@ -203,9 +206,37 @@ enum {
     HF_MEAN_SECOND = 12,
     HF_SHEAR_GAIN = 17,
     HF_NORMAL_GAIN = 18,
-    HF_RATIO_GAIN = 19
+    HF_RATIO_GAIN = 19,
+    /* Those of sliding (sliding.c): of the newest sample, ... */
+    HF_FIRST_SLIDING = 20,
+    HF_FRICTION = 20,
+    HF_TAXEL_FRICTION = 21,
+    HF_FORCE_TO_NOISE = 22,
+    HF_FRICTION_MARGIN = 23,
+    /* ... changes of the force and of what is computed from it, ... */
+    HF_SHEAR_BY_LOAD = 24,
+    HF_NORMAL_BY_LOAD = 25,
+    HF_FORCE_BY_LOAD = 26,
+    HF_FRICTION_RISE = 27,
+    HF_TAXEL_FRICTION_RISE = 28,
+    HF_ALIGNMENT = 29,
+    HF_CENTRE_SHIFT = 30,
+    /* ... of the taxels, ... */
+    HF_DIVERGENCE = 31,
+    HF_RELATIVE_DIVERGENCE = 32,
+    HF_NORMAL_DIVERGENCE = 33,
+    HF_FALLING_SHARE = 34,
+    HF_RISING_SHARE = 35,
+    /* ... and five energies of fast changes: at once, and over 30, 100 and 400 ms. */
+    HF_FAST = 36
 };
-enum { HF_N_SECONDS = 5 };
+enum {
+    HF_N_SECONDS = 5,
+    HF_N_ENERGIES = 5,
+    HF_N_ENERGY_TIMES = 3,
+    HF_N_AVERAGES = 20,       /* of a lag: of second differences, then of energies */
+    HF_N_FRICTION_BLOCKS = 32 /* blocks of time of which the largest friction is kept */
+};
 
 /* What is computed from a value of a force feature. */
 enum {
@@ -273,6 +304,7 @@ typedef struct {
                                the unit of the readings is not known */
     hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
     hf_real step;           /* smallest change of a reading; NaN where it is not known */
+    hf_real step_noise;     /* least noise of a reading in features of sliding */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */
@@ -301,6 +333,7 @@ typedef struct {
     bool has_seconds; /* some feature needs second differences, or their averages */
     bool has_means;   /* their averages */
     bool has_ratios;  /* HF_SHEAR_GAIN to HF_RATIO_GAIN */
+    uint64_t sliding; /* bit i: some feature needs HF_FIRST_SLIDING + i */
 } holdfast_lag;
 
 /* Tables: constants of a hand. Values of taxels stand in lanes: for each finger all x, then all y,
@@ -314,6 +347,7 @@ typedef struct {
     size_t n_channels; /* with Haar windows: 1 (F_a), or 4 (its components too) */
     size_t n_levels;   /* sizes of blocks in the longest window, see window.c */
     size_t n_track;    /* samples of the ring of relative features; at least 1 */
+    size_t n_slides;   /* of that of features of sliding: as many, or 0 without such features */
     hf_real period;    /* of the samples [s] */
     int32_t tare_kind;
     hf_real tare_seconds;
@@ -322,6 +356,7 @@ typedef struct {
     bool alike;            /* all fingers have the same features */
     bool has_centres;      /* some lag has changes: centre of pressure and moment are needed */
     bool has_ratios;       /* some lag has ratios */
+    bool zero_unknown;     /* the first samples are load, and no readings without are known */
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */
     const holdfast_lag *lags;         /* (n_lags), ascending */
@@ -371,7 +406,6 @@ typedef struct {
     hf_real hold;           /* time for which UNSTABLE is held [s] */
     bool has_filter;        /* the forward filter is used */
     hf_real switching;      /* how often a contact turns from one state to the other [1/s] */
-    bool zero_unknown;      /* the first samples are load, and no readings without are known */
 } holdfast_model;
 
 /* Estimate of a finger. Numbers that the model does not give are NaN. */

@@ -113,6 +113,21 @@ static inline void hf_store(hf_real *values, hf_wide a)
     *(hf_wide_in_memory *)values = a;
 }
 
+/* Return the square roots. */
+static inline hf_wide hf_root(hf_wide a)
+{
+#ifdef HF_SSE2
+    return HF_SSE2(sqrt)(a);
+#else
+    hf_real values[HF_WIDTH];
+    hf_store(values, a);
+    for (size_t l = 0; l < HF_WIDTH; ++l) {
+        values[l] = hf_sqrt(values[l]);
+    }
+    return hf_load(values);
+#endif
+}
+
 /* Return whether all of these numbers are above 0. */
 static inline bool hf_are_positive(hf_wide a)
 {

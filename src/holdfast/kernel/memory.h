@@ -76,6 +76,11 @@ typedef struct {
     hf_real pressure[3]; /* centre of pressure, in radii of the patch */
     hf_real moment;      /* about the normal, divided by the radius */
     hf_real ratio;       /* of tangential to normal force, beyond the reference */
+    /* With features of sliding (sliding.c): */
+    hf_real amplitude;       /* |F_tip| */
+    hf_real centre[3];       /* centre of pressure in the taxels' own frames, in radii */
+    hf_real friction;        /* of tangential to normal force */
+    hf_real taxel_friction;  /* the same of the taxels, by their share of the load */
 } holdfast_track;
 
 /* Load and noise of a finger with relative features (motion.c). */
@@ -106,6 +111,19 @@ typedef struct {
     hf_real contact_load;      /* force beyond contact_zero, or of the taxels */
     hf_real peak_contact_load; /* the largest so far, slowly forgotten */
 } holdfast_motion;
+
+/* What features of sliding remember of a finger (sliding.c). */
+typedef struct {
+    hf_real noise;       /* s: of a reading */
+    hf_real force_noise; /* s sqrt(m) */
+    hf_real weight;      /* sum of the normal readings' sizes; not 0 */
+    hf_real load;        /* L: the same, or 10 times the noise */
+    hf_real tangent[3];  /* direction of the tangential force */
+    hf_real friction;    /* averaged over 20 ms; NaN before the first sample */
+    double block_start;  /* of the block of time [s] */
+    hf_real largest;     /* such friction of this block */
+    hf_real past[HF_N_FRICTION_BLOCKS]; /* element j: the largest of the j blocks before it */
+} holdfast_slide;
 
 /* Memory of a finger. */
 typedef struct {
@@ -177,6 +195,7 @@ typedef struct {
     holdfast_taxel_set jumped; /* taxels that were refused as a jump at the last sample */
     hf_real rest_sum;          /* weighted sum of the readings at rest, see hf_scan; NaN before */
     holdfast_motion motion;
+    holdfast_slide slide;
     /* Readings that never changed (faults.c): last, as a living finger does not read it. */
     int64_t n_constant;   /* samples before the first that changed a reading */
     hf_real constant_sum; /* weighted sum of their readings, see hf_scan */
@@ -207,6 +226,7 @@ typedef struct {
     HF_ARRAY(hf_real, baseline, 3 * HOLDFAST_N_LANES);  /* a sum while the tare runs */
     HF_ARRAY(hf_real, reference, 3 * HOLDFAST_N_LANES); /* forces at the least normal force */
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
+    HF_ARRAY(hf_real, shares, 4 * HOLDFAST_N_LANES);    /* likewise, see sliding.c */
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */
@@ -219,9 +239,11 @@ typedef struct {
     /* (n_fingers, n_track) and (n_track, 3 n_lanes): rings. */
     HF_ARRAY(holdfast_track, track, HOLDFAST_N_FINGERS * HOLDFAST_N_TRACK);
     HF_ARRAY(hf_real, taxel_forces, HOLDFAST_N_TRACK * 3 * HOLDFAST_N_LANES);
-    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_SECONDS). */
+    /* (n_slides, 3 n_lanes): the same in the taxels' own frames, a ring. */
+    HF_ARRAY(hf_real, slides, (HOLDFAST_N_SLIDES + 1) * 3 * HOLDFAST_N_LANES);
+    /* (n_fingers, n_lags, HOLDFAST_N_RELATIVE) and (n_fingers, n_lags, HF_N_AVERAGES). */
     HF_ARRAY(hf_real, relative, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HOLDFAST_N_RELATIVE);
-    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_SECONDS);
+    HF_ARRAY(hf_real, averages, HOLDFAST_N_FINGERS * (HOLDFAST_N_LAGS + 1) * HF_N_AVERAGES);
     HF_ARRAY(hf_real, own, HOLDFAST_N_FINGERS * HOLDFAST_N_FEATURES); /* before `of_hand` */
     HF_ARRAY(hf_real, of_hand, HOLDFAST_N_FEATURES); /* that maximum, if the fingers are alike */
 } holdfast_memory;

@@ -419,9 +419,12 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     if (hand->has_ratios) {
         hf_update_ratio(f, now);
     }
+    if (HF_N_SLIDES(hand) > 0) {
+        hf_append_slide(f, now, time, step);
+    }
     if (n < 2) {
         hf_fill(f->relative, HF_N_LAGS(hand) * HOLDFAST_N_RELATIVE, HF_NAN);
-        hf_fill(f->averages, HF_N_LAGS(hand) * HF_N_SECONDS, HF_NAN);
+        hf_fill(f->averages, HF_N_LAGS(hand) * HF_N_AVERAGES, HF_NAN);
         return;
     }
     hf_real gain = hand->average_gain;
@@ -443,9 +446,19 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
         if (lag->has_ratios) {
             hf_fill_ratios(f, now, then, out);
         }
-        if (lag->has_seconds) {
-            hf_real *const averages = lag->has_means ? f->averages + i * HF_N_SECONDS : NULL;
-            hf_fill_seconds(f, hf_second_of(f, now, back, n_before), gain, averages, out);
+        if (lag->sliding) {
+            hf_fill_slide(f, lag, now, then, out);
+        }
+        const bool has_energies = lag->sliding >> (HF_FAST - HF_FIRST_SLIDING) != 0;
+        if (lag->has_seconds || has_energies) {
+            const hf_second second = hf_second_of(f, now, back, n_before);
+            hf_real *const averages = f->averages + i * HF_N_AVERAGES;
+            if (lag->has_seconds) {
+                hf_fill_seconds(f, second, gain, lag->has_means ? averages : NULL, out);
+            }
+            if (has_energies) {
+                hf_fill_energies(f, lag->sliding, second, step, averages + HF_N_SECONDS, out);
+            }
         }
     }
 }

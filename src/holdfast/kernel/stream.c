@@ -25,6 +25,7 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.reference = memory->reference + 3 * first;
     f.changes = memory->changes + 3 * first;
     f.pressed = memory->pressed + first;
+    f.shares = memory->shares + 4 * first;
     f.powers = memory->powers + 2 * first;
     f.taxels = memory->taxels + first;
     f.masks = memory->masks + first;
@@ -34,8 +35,9 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.blocks = memory->blocks + index * HF_N_HISTORY(hand) * n_blocks;
     f.track = memory->track + index * HF_N_TRACK(hand);
     f.taxel_forces = memory->taxel_forces + 3 * first;
+    f.slides = memory->slides + 3 * first;
     f.relative = memory->relative + index * n_lags * HOLDFAST_N_RELATIVE;
-    f.averages = memory->averages + index * n_lags * HF_N_SECONDS;
+    f.averages = memory->averages + index * n_lags * HF_N_AVERAGES;
     return f;
 }
 

@@ -42,11 +42,15 @@ static const char *hf_check_sizes(const holdfast_hand *hand)
         hand->n_track < (hand->n_lags > 0 ? 3u : 1u)) {
         return "n_lags or n_track";
     }
+    if (hand->n_slides != 0 && (hand->n_lags == 0 || hand->n_slides != hand->n_track)) {
+        return "n_slides";
+    }
 #ifdef HOLDFAST_N_FINGERS
     if (hand->n_fingers != HF_N_FINGERS(hand) || hand->n_lanes != HF_N_LANES(hand) ||
         hand->n_features != HF_N_FEATURES(hand) || hand->n_lags != HF_N_LAGS(hand) ||
         hand->n_history != HF_N_HISTORY(hand) || hand->n_channels != HF_N_CHANNELS(hand) ||
-        hand->n_levels != HF_N_LEVELS(hand) || hand->n_track != HF_N_TRACK(hand)) {
+        hand->n_levels != HF_N_LEVELS(hand) || hand->n_track != HF_N_TRACK(hand) ||
+        hand->n_slides != HF_N_SLIDES(hand)) {
         return "a size that differs from its macro";
     }
 #endif
@@ -68,7 +72,8 @@ static const char *hf_check_numbers(const holdfast_hand *hand)
         return "tare_seconds, noise_seconds or average_gain";
     }
     for (size_t i = 0; i < hand->n_lags; ++i) {
-        if (!isfinite(hand->lags[i].seconds) || hand->lags[i].samples > HF_MAX_SAMPLES) {
+        if (!isfinite(hand->lags[i].seconds) || hand->lags[i].samples > HF_MAX_SAMPLES ||
+            (hand->lags[i].sliding && hand->n_slides == 0)) {
             return "a lag";
         }
     }
@@ -174,6 +179,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->baseline = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->reference = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
+    m->shares = (hf_real *)hf_take(block, &used, 4 * lanes, width);
     m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
     m->levels = (hf_real *)hf_take(block, &used, lanes, width);
@@ -182,8 +188,9 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
         block, &used, rows * hand->n_channels * hand->n_levels * HF_N_SUMS, width);
     m->track = (holdfast_track *)hf_take(block, &used, fingers * samples, sizeof *m->track);
     m->taxel_forces = (hf_real *)hf_take(block, &used, samples * 3 * lanes, width);
+    m->slides = (hf_real *)hf_take(block, &used, hand->n_slides * 3 * lanes, width);
     m->relative = (hf_real *)hf_take(block, &used, lags * HOLDFAST_N_RELATIVE, width);
-    m->averages = (hf_real *)hf_take(block, &used, lags * HF_N_SECONDS, width);
+    m->averages = (hf_real *)hf_take(block, &used, lags * HF_N_AVERAGES, width);
     m->own = (hf_real *)hf_take(block, &used, fingers * features, width);
     m->of_hand = (hf_real *)hf_take(block, &used, features, width);
     return used;
@@ -242,7 +249,7 @@ HF_SHARED void hf_begin_finger(const hf_finger *f)
         f->hand->tare_kind == HOLDFAST_TARE_SECONDS ? HOLDFAST_TARE : HOLDFAST_WARM_UP;
     memset(f->laws, 0, sizeof *f->laws);
     hf_fill(f->relative, HF_N_LAGS(f->hand) * HOLDFAST_N_RELATIVE, HF_NAN);
-    hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_SECONDS, HF_NAN);
+    hf_fill(f->averages, HF_N_LAGS(f->hand) * HF_N_AVERAGES, HF_NAN);
     for (size_t i = 0; i < f->n; ++i) {
         f->taxels[i].changed_at = f->used[i] > 0 ? 0 : INT64_MAX; /* never still */
     }

@@ -29,6 +29,23 @@ def percent(part: float, whole: float) -> float | None:
     return 100.0 * part / whole if whole else None
 
 
+def poisson_limit(n: int, confidence: float = 0.95) -> float:
+    """Return the exact upper limit of the mean of a Poisson number that was n.
+
+    It is the mean m with P(at most n | m) = 1 - confidence.
+
+    Example:
+        >>> [round(poisson_limit(n), 3) for n in (0, 1, 10)]
+        [2.996, 4.744, 16.962]
+    """
+    low, high = 0.0, 10.0 + 2.0 * n
+    for _ in range(64):  # by bisection: the bits of a float64
+        mean = (low + high) / 2
+        logs = [k * math.log(mean) - mean - math.lgamma(k + 1) for k in range(n + 1)]
+        low, high = (mean, high) if sum(map(math.exp, logs)) > 1 - confidence else (low, mean)
+    return high
+
+
 def mann_whitney_u(positive: Array, negative: Array) -> float:
     """Return the Mann-Whitney statistic U.
 

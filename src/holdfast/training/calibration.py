@@ -8,7 +8,7 @@ from typing import Self
 import msgspec
 import numpy as np
 
-from holdfast.detection import FingerModel, Handling, Model
+from holdfast.detection import FingerModel, Handling, HeadName, Model
 from holdfast.detection.specs import KINDS
 from holdfast.errors import ModelError, TrainingError
 from holdfast.recordings import Recording
@@ -25,9 +25,11 @@ from holdfast.training.own_handling import (
 from holdfast.training.thresholds import (
     GraspingFinger,
     GraspingFingers,
+    HandlingSlips,
     Steps,
     ThresholdReplay,
-    choose_handling_thresholds,
+    choose_handling_slips,
+    choose_stability_threshold,
 )
 
 MAX_FINGERS_SHOWN = 5
@@ -41,6 +43,8 @@ factor."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
 more in the held samples in which it does not slide; over half have more while they slide."""
+FALSE_ALARMS = 1.0
+"""False alarms of slips per minute of held time of a finger, unless another number is given."""
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 
@@ -78,10 +82,10 @@ class HandlingFigures(msgspec.Struct, frozen=True):
         slip = None if part.slip is None else part.slip.threshold
         return cls(
             threshold=stable,
-            stable=100 * handling.share("stable", stable),
-            alarms_per_minute=handling.alarms_per_minute("stable", stable),
+            stable=100 * handling.share(stable),
+            alarms_per_minute=handling.alarms_per_minute(stable),
             slip_threshold=slip,
-            raised=None if slip is None else 100 * handling.share("slip", slip),
+            raised=None if slip is None else 100 * handling.raised,
         )
 
     def worse_than(self, other: "HandlingFigures") -> bool:
@@ -113,6 +117,7 @@ class HandlingSummary(msgspec.Struct, frozen=True):
             changes: the scales are stretched to the default then.
         before: decisions about this handling, by the model that was given.
         after: the same, by the calibrated model.
+        slips: threshold of each head of slips.
     """
 
     sensor: str
@@ -125,6 +130,7 @@ class HandlingSummary(msgspec.Struct, frozen=True):
     still: bool
     before: HandlingFigures
     after: HandlingFigures
+    slips: tuple[HandlingSlips, ...] = ()
 
     def text(self) -> str:
         """Return what was seen of the sensor: held time, motion, and features that differ."""
@@ -203,7 +209,7 @@ class CalibratedModel:
 
 
 def calibrate(
-    model: Model, recordings: Iterable[Recording], *, false_alarms: float | None = None
+    model: Model, recordings: Iterable[Recording], *, false_alarms: float = FALSE_ALARMS
 ) -> Model:
     """Return the model with the own handling of some recordings, which need no labels.
 
@@ -213,14 +219,13 @@ def calibrate(
     Args:
         model: whose features are normalised, such as `builtin:any`.
         recordings: of ordinary handling; are read more than once.
-        false_alarms: maximum number of alarms a minute of this handling; by default, the share
-            of held samples that is STABLE sets the threshold.
+        false_alarms: maximum number of false alarms of slips per minute of held time of a finger.
+            Where that leaves hardly a slip to be found, the model reports none.
 
     Raises:
         ModelError: the features of the model are not normalised, or the sensor is another.
-        TrainingError: too little is held, a finger has faults, most of it seems to be slip, or no
-            threshold gives so few alarms.
-        ValueError: the number of false alarms is negative or not finite.
+        TrainingError: too little is held, a finger has faults, or most of it seems to be slip.
+        ValueError: the number of false alarms is not above 0, or not finite.
 
     Example:
         ```python
@@ -237,7 +242,7 @@ def calibrate_with_report(
     model: Model,
     recordings: Iterable[Recording],
     *,
-    false_alarms: float | None = None,
+    false_alarms: float = FALSE_ALARMS,
     progress: Steps = lambda recordings: recordings,
 ) -> CalibratedModel:
     """Calibrate a model as `calibrate`, and return what the calibration saw.
@@ -253,8 +258,8 @@ def calibrate_with_report(
         TrainingError: as in `calibrate`.
         ValueError: as in `calibrate`.
     """
-    if false_alarms is not None and not (math.isfinite(false_alarms) and false_alarms >= 0):
-        raise ValueError(f"false alarms per minute of at least 0 expected, {false_alarms:g} given")
+    if not (math.isfinite(false_alarms) and false_alarms > 0):
+        raise ValueError(f"false alarms per minute above 0 expected, {false_alarms:g} given")
     check_normalised(model)
     recordings = recordings if isinstance(recordings, Sequence) else list(recordings)
     handling = OwnHandling(model)
@@ -282,13 +287,14 @@ def activity(part: FingerModel, features: Array) -> float:
 
     Args:
         part: whose features they are.
-        features: (n, n_features) of held samples.
+        features: (n, n_features) of `stable`, of held samples.
 
     Returns:
         The median over the samples of the mean over the features, in default scales; 0 without
         such features.
     """
-    columns = [k for k, spec in enumerate(part.features) if KINDS[spec.kind].family == "change"]
+    specs = part.stable.features
+    columns = [k for k, spec in enumerate(specs) if KINDS[spec.kind].family == "change"]
     if not columns:
         return 0.0
     location, scale = part.default_handling
@@ -320,23 +326,26 @@ class _Calibration:
         self.model, self.seen, self.recordings = handling.model, handling, recordings
         self.keys = [key for key in handling.samples if handling.seconds(key) >= MIN_HANDLING]
 
-    def result(self, false_alarms: float | None) -> CalibratedModel:
+    def result(self, false_alarms: float) -> CalibratedModel:
         """Return the calibrated model, with what the calibration saw.
 
         Raises:
-            TrainingError: most of the handling seems to be slip, or no threshold gives so few
-                alarms.
+            TrainingError: most of the handling seems to be slip.
         """
         # The thresholds are chosen on decisions by the new location and scale: these come first.
         handling = {key: self._normalisation(key) for key in self.keys}
         before = self._decide(self.model)
         after = self._decide(_with_handling(self.model, handling))
+        slips: dict[HandlingKey, list[HandlingSlips]] = {}
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            chosen = choose_handling_thresholds(after[key], part, false_alarms, moves=moves)
+            slips[key] = choose_handling_slips(after[key], part, false_alarms)
+            chosen: dict[HeadName, float] = {one.head: one.threshold for one in slips[key]}
+            chosen["stable"] = choose_stability_threshold(after[key], part, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
         model = _with_handling(self.model, handling)
+        after = self._decide(model)
         name = model.name.removesuffix(CALIBRATED_SUFFIX)
         sensors = []
         for key, own in handling.items():
@@ -352,6 +361,7 @@ class _Calibration:
                 still=self._still(key),
                 before=HandlingFigures.of(before[key], part.for_sensor(key.sensor)),
                 after=HandlingFigures.of(after[key], part.with_handling(own)),
+                slips=tuple(slips[key]),
             )
             sensors.append(summary)
         return CalibratedModel(
@@ -405,7 +415,10 @@ class _Calibration:
             for name, decisions in replay.raw.fingers.items():
                 key = HandlingKey.of(model, name, recording.modules[name].sensor)
                 grasped = grasped_samples(decisions.times, decisions.states)
-                fingers.setdefault(key, []).append(GraspingFinger(name, replay, grasped))
+                sensors = {name: recording.modules[name].sensor}
+                plan = model.plan(sensors, recording.rate).for_recording(recording)
+                finger = GraspingFinger(name, replay, grasped, plan.zero_unknown)
+                fingers.setdefault(key, []).append(finger)
         return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:

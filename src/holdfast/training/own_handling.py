@@ -74,7 +74,7 @@ class GraspedSamples:
     Attributes:
         finger: its name.
         sensor: its sensor.
-        features: (n, n_features) finite.
+        features: (n, n_features) of `stable`, finite.
         load_changes: (m,) change of the force within `CHANGE_SECONDS`, as a share of it; NaN if
             the load is not known: of counts of a recording that begins in contact.
         seconds: held time, with closing and opening [s].
@@ -140,7 +140,9 @@ class OwnHandling:
             self._faults[name] = _Faults(
                 before.n_faulty + int(faulty.sum()), before.n + len(trace), before.mask | mask
             )
-            self._add_finger(name, sensors[name], trace, rows[name].features, loaded=loaded)
+            n_features = len(self.model.finger(name).stable.features)  # those that come first
+            features = rows[name].features[:, :n_features]
+            self._add_finger(name, sensors[name], trace, features, loaded=loaded)
             self._add_slips(recording, name, trace)
 
     def fingers(self, key: HandlingKey) -> dict[str, float]:

@@ -363,7 +363,7 @@ def _base_of(model: Model, parts: Sequence[TaughtPart]) -> Model:
     model = model.with_handling_of(sensors)
     return model.changed(
         lambda part: msgspec.structs.replace(
-            part.without_heads("slip", "slip_speed"), normalised=False
+            part.without_heads("slip", "slip_changes", "slip_speed"), normalised=False
         )
     )
 

@@ -40,12 +40,15 @@ from holdfast.metrics.slip_curves import (
     SlipSummary,
     ThresholdChoice,
     choose_threshold,
+    slip_curve,
     slip_summary,
     summarise_choice,
 )
+from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTruth
 from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, slip_metrics
+from holdfast.metrics.statistics import poisson_limit
 from holdfast.recordings import Recording
-from holdfast.sensors.types import Array, Flags
+from holdfast.sensors.types import Flags
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.own_handling import grasped_durations, location_and_scale
 
@@ -60,18 +63,20 @@ SLIP_FALSE_ALARMS = 1.0
 """False alarms per minute of all held time of a finger for which `train` sets the threshold."""
 STABLE_SHARE = 0.95
 """Share of the held samples of own handling that is STABLE."""
-RAISED_SHARE = 0.05
-"""Share of the held samples of own handling in which a slip may be reported."""
 MAX_DISTANCE = 3.0
 """A threshold is at most this many scales of the log odds from their location: what is further
 away is taken for slip, and the share is not reached then."""
+MIN_FOUND = 0.1
+"""Share of the training's slips that a threshold finds, below which own handling sets none."""
+MORE_MINUTES = 3.0
+"""Further held time for which the upper end of a rate is shown [min]."""
+N_HIGHEST, APART = 5, 0.5
+"""Number of the highest probabilities that are shown, and their least distance in time [s]."""
 HIGHEST_THRESHOLD = 0.9
 """Highest threshold of stability that own handling sets."""
 
 TunedHead = Literal["stable", "slip"]
 Steps = Callable[[Iterable[Recording]], Iterable[Recording]]
-Thresholds = dict[HeadName, float]
-"""Thresholds of a model on one sensor, by head."""
 
 
 @dataclass(frozen=True)
@@ -480,7 +485,9 @@ def with_slip_threshold(model: Model, point: CurvePoint | None) -> Model:
     """Return the model whose slip rules have a threshold; without slip rules if there is none."""
     if point is None:
         return model.changed(
-            lambda part: part.without_thresholds("slip").without_heads("slip", "slip_speed")
+            lambda part: part.without_thresholds("slip").without_heads(
+                "slip", "slip_changes", "slip_speed"
+            )
         )
     return model.with_threshold("slip", point.threshold, point.choice(SLIP_FALSE_ALARMS))
 
@@ -493,46 +500,53 @@ class GraspingFinger:
         name: of the finger.
         replay: of the recording.
         grasped: (n,) True where the finger holds something.
+        zero_unknown: whether the recording begins in contact, and its zero is not known.
     """
 
     name: str
     replay: ThresholdReplay
     grasped: Flags
+    zero_unknown: bool = False
 
     @property
     def decisions(self) -> FingerDecisions:
         """Decisions about the finger without debouncing."""
         return self.replay.raw.fingers[self.name]
 
-    def probability(self, head: TunedHead) -> Array:
-        """Return the probability of a head in the held samples; none without a slip rule."""
-        slip = self.decisions.slip
-        if head == "stable":
-            return self.decisions.stable_probability[self.grasped]
-        return np.empty(0) if slip is None else slip.probability[self.grasped]
+    @property
+    def seconds(self) -> float:
+        """Held time [s]."""
+        return float(grasped_durations(self.decisions.times)[self.grasped].sum())
 
-    def decided(self, head: TunedHead, threshold: float) -> Flags:
-        """Return (n,) the held samples that are STABLE, or in which a slip is reported."""
-        slip = self.decisions.slip
-        if head == "stable":
-            return (
-                np.asarray(self.replay.states(self.decisions, threshold) == STABLE) & self.grasped
-            )
-        if slip is None:
-            return np.zeros_like(self.grasped)
-        return np.asarray(slip.raised_at(np.array([threshold]))[0] & self.grasped)
+    def stable(self, threshold: float) -> Flags:
+        """Return (n,) the held samples that are STABLE at a threshold."""
+        states = self.replay.states(self.decisions, threshold)
+        return np.asarray((states == STABLE) & self.grasped)
 
-    def n_alarms(self, head: TunedHead, threshold: float) -> int:
-        """Return the number of alarms: reported slips, or UNSTABLE between STABLE and STABLE.
+    @property
+    def n_raised(self) -> int:
+        """Number of held samples in which a slip is reported, at the threshold of the model."""
+        slip = self.decisions.slip
+        return 0 if slip is None else int((slip.raised & self.grasped).sum())
+
+    def n_alarms(self, threshold: float) -> int:
+        """Return the number of alarms of a threshold: UNSTABLE between STABLE and STABLE.
 
         An alarm that ends with the release of the object is right in ordinary handling.
         """
-        if head == "slip":
-            return len(runs(self.decided(head, threshold)))
         states = self.replay.states(self.decisions, threshold)
         spells = runs(states == UNSTABLE)
         inside = [(a, b) for a, b in spells if self.grasped[a] and a > 0 and b < len(states)]
         return sum(bool(states[a - 1] == states[b] == STABLE) for a, b in inside)
+
+    @property
+    def slips(self) -> SlipDecisions | None:
+        """Decisions about slips, by a truth in which all that is held is still; None without."""
+        slip = self.decisions.slip
+        if slip is None:
+            return None
+        codes = np.where(self.grasped, STILL, NOT_HELD).astype(np.int8)
+        return replace(slip, truth=SlipTruth(codes, self.grasped, (), "labels"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -546,89 +560,190 @@ class GraspingFingers:
         """Held time of the finger that holds longest [s]."""
         totals: dict[str, float] = {}
         for finger in self.fingers:
-            held = grasped_durations(finger.decisions.times)[finger.grasped]
-            totals[finger.name] = totals.get(finger.name, 0.0) + float(held.sum())
+            totals[finger.name] = totals.get(finger.name, 0.0) + finger.seconds
         return max(totals.values(), default=0.0)
 
-    def share(self, head: TunedHead, threshold: float) -> float:
-        """Return the share of the held samples that are STABLE, or in which a slip is reported."""
-        n_grasped = sum(int(finger.grasped.sum()) for finger in self.fingers)
-        n = sum(int(finger.decided(head, threshold).sum()) for finger in self.fingers)
-        return n / max(n_grasped, 1)
+    @property
+    def n_held(self) -> int:
+        """Number of held samples, at least 1."""
+        return max(sum(int(finger.grasped.sum()) for finger in self.fingers), 1)
 
-    def alarms_per_minute(self, head: TunedHead, threshold: float) -> float:
+    def share(self, threshold: float) -> float:
+        """Return the share of the held samples that are STABLE at a threshold."""
+        return sum(int(f.stable(threshold).sum()) for f in self.fingers) / self.n_held
+
+    @property
+    def raised(self) -> float:
+        """Share of the held samples in which a slip is reported, at the threshold of the model."""
+        return sum(finger.n_raised for finger in self.fingers) / self.n_held
+
+    def alarms_per_minute(self, threshold: float) -> float:
         """Return the number of alarms of all fingers per minute of held time."""
-        return 60 * sum(finger.n_alarms(head, threshold) for finger in self.fingers) / self.seconds
+        return 60 * sum(finger.n_alarms(threshold) for finger in self.fingers) / self.seconds
 
-    def probability_at(self, head: TunedHead, distance: float) -> float:
-        """Return the probability at so many scales of its log odds from their location."""
-        known = np.concatenate([np.empty(0), *(f.probability(head) for f in self.fingers)])
-        bounded = np.clip(known, 1e-12, 1 - 1e-12)  # they may be 0 or 1
+    def furthest(self) -> float:
+        """Return the probability that is `MAX_DISTANCE` scales of its log odds below theirs."""
+        probability = np.concatenate(
+            [f.decisions.stable_probability[f.grasped] for f in self.fingers]
+        )
+        bounded = np.clip(probability, 1e-12, 1 - 1e-12)  # they may be 0 or 1
         location, scale = location_and_scale(np.log(bounded / (1 - bounded))[:, None])
-        return float(1 / (1 + math.exp(-(location[0] + distance * scale[0]))))
+        return float(1 / (1 + math.exp(-(location[0] - MAX_DISTANCE * scale[0]))))
 
-    def choose(self, head: TunedHead, default: float, false_alarms: float | None) -> float:
-        """Return the most sensitive threshold that is quiet, as all quieter ones are.
+    def choose(self, highest: float) -> float:
+        """Return the highest threshold of stability that is quiet, as all lower ones are.
+
+        It is the quietest near one where none is quiet.
 
         Args:
-            head: whose threshold is chosen.
-            default: the most sensitive threshold.
-            false_alarms: maximum number a minute; None for the share of quiet samples, of which
-                the quietest near threshold falls short where none has it.
-
-        Raises:
-            TrainingError: no threshold gives so few alarms.
+            highest: the most sensitive threshold.
         """
-        # Quieter are lower thresholds of stability, and higher ones of a slip.
-        sign = 1 if head == "stable" else -1
-        quieter = THRESHOLDS[sign * THRESHOLDS < sign * default][::sign]
-        thresholds: list[float] = [*quieter.tolist(), default]
-        if false_alarms is None:
-            furthest = sign * self.probability_at(head, -sign * MAX_DISTANCE)
-            near = [t for t in thresholds if sign * t >= furthest] or [default]
-            limit = STABLE_SHARE if head == "stable" else -RAISED_SHARE
-            quiet = takewhile(lambda t: sign * self.share(head, t) >= limit, near)
-            return [near[0], *quiet][-1]
-        # Beyond the first that alarms too often alarms may be fewer again, as a finger that is
-        # never STABLE has none.
-        quiet = takewhile(lambda t: self.alarms_per_minute(head, t) <= false_alarms, thresholds)
-        if chosen := list(quiet):
-            return chosen[-1]
-        least = min(self.alarms_per_minute(head, t) for t in thresholds)
-        kind = "alarms" if head == "stable" else "reported slips"
-        raise TrainingError(
-            f"no threshold gives at most {false_alarms:g} {kind} a minute of this handling; the "
-            f"least is {least:.2g}"
-        )
+        thresholds = [*THRESHOLDS[highest > THRESHOLDS].tolist(), highest]
+        furthest = self.furthest()
+        near: list[float] = [t for t in thresholds if t >= furthest] or [highest]
+        quiet = takewhile(lambda t: self.share(t) >= STABLE_SHARE, near)
+        return [near[0], *quiet][-1]
 
 
-def choose_handling_thresholds(
-    handling: GraspingFingers,
-    part: FingerModel,
-    false_alarms: float | None = None,
-    *,
-    moves: bool = False,
-) -> Thresholds:
-    """Choose the thresholds of a model on own handling.
+def choose_stability_threshold(
+    handling: GraspingFingers, part: FingerModel, *, moves: bool = False
+) -> float:
+    """Choose the threshold of stability of a model on own handling.
 
-    The threshold of stability is at most that of the model, the threshold of slips at least:
-    handling that is still says nothing about motion, so it is no reason to alarm more. Handling
-    in which the arm moves may raise the threshold of stability to `HIGHEST_THRESHOLD`. Up to there
-    it is the most sensitive at which enough held samples are quiet: `STABLE_SHARE` of them STABLE,
-    a slip reported in at most `RAISED_SHARE`, but not further than `MAX_DISTANCE`; or at which
-    there are at most so many alarms of either kind.
+    It is the most sensitive at which `STABLE_SHARE` of the held samples are STABLE, but not further
+    than `MAX_DISTANCE`. It is at most that of the model: handling that is still says nothing about
+    motion, so it is no reason to alarm more. Handling in which the arm moves may raise it to
+    `HIGHEST_THRESHOLD`.
 
     Args:
         handling: decided with its own location and scale.
         part: model of the fingers, with the thresholds of the model.
-        false_alarms: maximum number of alarms a minute of held time; None for the shares.
         moves: whether the arm moves in the handling.
-
-    Raises:
-        TrainingError: no threshold gives so few alarms of a kind.
     """
-    default = max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0)
-    chosen: Thresholds = {"stable": handling.choose("stable", default, false_alarms)}
-    if part.slip is not None:
-        chosen["slip"] = handling.choose("slip", part.slip.threshold, false_alarms)
+    return handling.choose(max(part.stable.threshold, HIGHEST_THRESHOLD if moves else 0.0))
+
+
+class SlipAlarm(msgspec.Struct, frozen=True):
+    """A time of own handling at which the probability of a slip is among the highest.
+
+    Attributes:
+        recording: its name.
+        finger: its name.
+        time: [s].
+        probability: of a slip.
+    """
+
+    recording: str
+    finger: str
+    time: float
+    probability: float
+
+
+class HandlingSlips(msgspec.Struct, frozen=True):
+    """Threshold of slips that own handling sets, in which nothing slips.
+
+    Attributes:
+        head: `slip`, or `slip_changes` of recordings that begin in contact.
+        threshold: of the probability; 1 if the head stays silent.
+        n: number of false alarms at the threshold.
+        minutes: held time of all fingers [min].
+        at_most: upper end of the rate of false alarms per minute, with 95 %.
+        more_minutes: held time of all fingers [min] after which that would be lower.
+        then_at_most: it would be this at the same rate.
+        found: share of the slips of the training that the threshold finds before 1 mm [%]; None if
+            it is not known.
+        highest: the highest probabilities, of which no two are within 0.5 s of a finger.
+    """
+
+    head: HeadName
+    threshold: float
+    n: int
+    minutes: float
+    at_most: float
+    more_minutes: float
+    then_at_most: float
+    found: float | None
+    highest: tuple[SlipAlarm, ...]
+
+    @property
+    def is_silent(self) -> bool:
+        """Whether no threshold is both quiet and of use."""
+        return self.threshold >= 1
+
+    def text(self) -> str:
+        """Return the threshold with the interval of its rate, or why there is none."""
+        if self.is_silent:
+            times = ", ".join(f"{x.finger} {x.time:.2f} s" for x in self.highest)
+            return (
+                f"{self.head}: no threshold with few enough false alarms finds a tenth of the "
+                f"training's slips, so none is reported; look whether something slips at {times}"
+            )
+        found = "" if self.found is None else f", finds {self.found:.0f} % of the training's slips"
+        return (
+            f"{self.head}: reported from {self.threshold:.3g} on{found}; {self.n} false alarms in "
+            f"{self.minutes:.1f} minutes of a finger: at most {self.at_most:.1f} a minute with "
+            f"95 %, {self.more_minutes:g} minutes more bring it to {self.then_at_most:.1f}"
+        )
+
+
+def choose_handling_slips(
+    handling: GraspingFingers, part: FingerModel, false_alarms: float
+) -> list[HandlingSlips]:
+    """Choose the thresholds of slips on own handling in which nothing slips.
+
+    Each is the lowest with at most so many false alarms, if all higher ones have as few. Where it
+    would find under `MIN_FOUND` of the slips of the training, the head stays silent.
+
+    Args:
+        handling: decided by the model.
+        part: model of the fingers.
+        false_alarms: maximum number per minute of held time of a finger.
+    """
+    chosen: list[HandlingSlips] = []
+    for name in ("slip", "slip_changes"):
+        head = part.head(name)
+        fingers = [
+            finger
+            for finger in handling.fingers
+            if part.deciding("slip", zero_unknown=finger.zero_unknown) is head
+        ]
+        decided = [(finger, slips) for finger in fingers if (slips := finger.slips) is not None]
+        if head is None or not decided:
+            continue
+        curve = SlipCounts.total([slip_curve(slips) for _, slips in decided])
+        index = choose_threshold(curve, ThresholdChoice(false_alarms))
+        threshold = 1.0 if index is None else float(SLIP_THRESHOLDS[index])
+        found = head.share_found(threshold)
+        if found is not None and found < MIN_FOUND:
+            index = None
+        n = int(curve.false_held[-1 if index is None else index])
+        minutes = curve.held_seconds / 60
+        then = minutes + MORE_MINUTES
+        chosen.append(
+            HandlingSlips(
+                head=head.name,
+                threshold=1.0 if index is None else threshold,
+                n=n,
+                minutes=minutes,
+                at_most=poisson_limit(n) / minutes,
+                more_minutes=MORE_MINUTES,
+                then_at_most=poisson_limit(round(n * then / minutes)) / then,
+                found=None if found is None else 100 * found,
+                highest=tuple(_highest(decided)),
+            )
+        )
     return chosen
+
+
+def _highest(decided: Sequence[tuple[GraspingFinger, SlipDecisions]]) -> Iterator[SlipAlarm]:
+    """Yield the highest probabilities in held time, from the highest on."""
+    probabilities = [np.where(f.grasped, slips.probability, -1.0) for f, slips in decided]
+    for _ in range(N_HIGHEST):
+        k = int(np.argmax([np.nanmax(p, initial=-1.0) for p in probabilities]))
+        (finger, slips), own = decided[k], probabilities[k]
+        best = int(np.nanargmax(own))
+        if own[best] < 0:
+            return
+        time = float(slips.times[best])
+        yield SlipAlarm(finger.replay.raw.name, finger.name, time, float(own[best]))
+        own[np.abs(slips.times - time) < APART] = -1.0

@@ -127,7 +127,8 @@ def verdict(
     if reports_slips:
         return f"{sentence}{ending} {_by_slips(slips, n, in_sample=in_sample)}"
     auc = "" if slips.pooled.auc is None else f"; P(slip) has an AUC of {slips.pooled.auc:.2f}"
-    return f"{sentence}{ending} Slips: none is reported until it is taught (holdfast teach){auc}."
+    silent = "none is reported until the model is calibrated (holdfast calibrate)"
+    return f"{sentence}{ending} Slips: {silent}{auc}."
 
 
 def no_verdict(n_seen: int, n_recordings: int, model: str = "the model") -> str:

@@ -21,6 +21,8 @@ TREMOR_BAND = (6.0, 11.0)
 N_TREMORS = 8
 """Number of sinusoids in the tremor."""
 
+DEPTH = 6
+"""Index of the depth in the parameters of a disturbance."""
 NO_GUIDE = np.zeros(N_GUIDE)
 """A guiding hand that does not touch the object."""
 
@@ -52,6 +54,17 @@ class Disturbance(NamedTuple):
     direction: str
     style: int
     parameters: Array
+
+    @property
+    def end(self) -> float:
+        """Time after the lock at which it is over [s]."""
+        return self.start + self.duration
+
+    def scaled(self, factor: float) -> "Disturbance":
+        """Return the same disturbance with another depth."""
+        parameters = self.parameters.copy()
+        parameters[DEPTH] *= factor
+        return self._replace(parameters=parameters)
 
 
 def draw_disturbances(

@@ -5,7 +5,8 @@ a finger disturbs it. `finger-reference`, `finger-gentle` and `finger-vigorous` 
 of holdfast 0.1, in which only a finger disturbs; they repeat its recordings and labels exactly.
 In `slips` the object also slides by other things than pushes. `long-hold` is a calm hold of
 minutes, for rates of false alarms. In `coupled`
-the nodes of the skin are coupled, and the rests of `reference` have impacts.
+the nodes of the skin are coupled, and the rests of `reference` have impacts. In `handling` the arm
+moves, too, and nothing slides.
 """
 
 import math
@@ -88,6 +89,22 @@ class ImpactRanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     ring_decay: Span
 
 
+class ArmRanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Numbers that describe motions of the arm; see `loads.draw_arm_motions`.
+
+    Attributes:
+        share: share of the rests between two disturbances in which the arm moves.
+        acceleration: largest acceleration of a lift or a way [m/s^2].
+        duration: duration of a motion [s].
+        angle: largest angle of a turn there and back [rad].
+    """
+
+    share: float
+    acceleration: Span
+    duration: Span
+    angle: Span
+
+
 class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Numbers that describe a grasp and its disturbances.
 
@@ -115,6 +132,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
         arm_tremor: rms acceleration of the hand by the tremor of its arm [m/s^2].
         slips: ranges of slips that no push causes; None: there are none.
         impacts: ranges of the impacts in case 2; None: there are none.
+        arm: ranges of the motions of the arm in case 2; None: it is at rest.
+        without_slips: whether a grasp in which something slides is made again, more gently.
         coupled: whether the nodes of the skin are coupled (`skin.COUPLED`).
         drawn_as: name under which random numbers are drawn; by default that of the profile.
     """
@@ -141,6 +160,8 @@ class Profile(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     arm_tremor: float = 0.0
     slips: SlipRanges | None = None
     impacts: ImpactRanges | None = None
+    arm: ArmRanges | None = None
+    without_slips: bool = False
     coupled: bool = False
     drawn_as: str = ""
 

@@ -11,8 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import Phase
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags
 from holdfast.twin.impacts import Impact
+from holdfast.twin.loads import Load
 from holdfast.twin.operator import Disturbance
 from holdfast.twin.profile import Profile
 from holdfast.twin.slip_events import SlipEvent
@@ -38,6 +39,12 @@ LOST_CONTACT_TIME = 0.1
 """Time of contact with fewer than two fingertips after which the object is lost [s]."""
 MIN_TOUCH_LOAD = 0.05
 """Minimum load of a fingertip in contact [N]."""
+EASED, FIRMER = 0.6, 1.15
+"""Factors of the size of what made a finger slide, and of a grip in which one slides by itself,
+when the grasp is made again."""
+EASED_TIME = 0.35
+"""Time after an action in which a slip still counts as made by it [s]: so long do labels close
+pauses."""
 SLIPPING_SPEED = 0.001
 """Minimum slip speed of a fingertip at which the object slips in a disturbance [m/s]."""
 
@@ -55,6 +62,8 @@ class Plan(NamedTuple):
         disturbances: disturbances in order of time.
         slip_events: events that let the object slide, in order of time.
         impacts: impacts in order of time.
+        loads: loads on the object, such as motions of the arm.
+        glitch_size: factor of the errors of set-points in glitches of the controller.
     """
 
     profile: Profile
@@ -65,6 +74,34 @@ class Plan(NamedTuple):
     disturbances: Sequence[Disturbance]
     slip_events: Sequence[SlipEvent] = ()
     impacts: Sequence[Impact] = ()
+    loads: Sequence[Load] = ()
+    glitch_size: float = 1.0
+
+    def eased(self, onsets: Array, glitched: Flags, *, firmer: bool = False) -> "Plan":
+        """Return the plan of the same grasp after some slips, made more gently.
+
+        What acted at the onset of a slip, or within `EASED_TIME` before, has `EASED` of its size,
+        and so have all glitches after one of them. The grip is firmer by `FIRMER` where nothing
+        acted, and on demand.
+
+        Args:
+            onsets: (n,) of the slips, after the lock [s].
+            glitched: (n,) whether a glitch of the controller acted then.
+            firmer: whether the grip is firmer in any case.
+        """
+        actions: list[Disturbance | Impact | Load]
+        actions = [*self.disturbances, *self.impacts, *self.loads]
+        spans = [(action.start, action.end) for action in actions]
+        starts, ends = np.array(spans).reshape(-1, 2).T[:, :, None]
+        acted = (starts <= onsets) & (onsets <= ends + EASED_TIME)
+        factors = iter(np.where(acted.any(axis=1), EASED, 1.0).tolist())
+        return self._replace(
+            disturbances=[push.scaled(next(factors)) for push in self.disturbances],
+            impacts=[impact._replace(size=impact.size * next(factors)) for impact in self.impacts],
+            loads=[load._replace(size=load.size * next(factors)) for load in self.loads],
+            glitch_size=self.glitch_size * (EASED if glitched.any() else 1.0),
+            grips=self.grips * (FIRMER if firmer or (~acted.any(axis=0) & ~glitched).any() else 1),
+        )
 
 
 class Command(NamedTuple):

@@ -3,7 +3,7 @@
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,13 @@ import msgspec
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.metrics.truth_labels import LabelRule, labels_from_truth, phases_from_touch
+from holdfast.metrics.slip_truth import MIN_SLIP_DISTANCE, finger_slips
+from holdfast.metrics.truth_labels import (
+    LabelRule,
+    glitches,
+    labels_from_truth,
+    phases_from_touch,
+)
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import Sensor, sensor
 from holdfast.sensors.types import Array
@@ -21,12 +27,12 @@ from holdfast.twin.force_skin import FORCE_SENSORS, ForceReadout, ForceSkin
 from holdfast.twin.grasp import ClosingPath, Pressing, closing_path
 from holdfast.twin.hand import FINGERS, N_JOINTS, RATE, TIMESTEP, HandModel
 from holdfast.twin.impacts import NO_IMPACT, Impact, ImpactState, draw_impacts, impact_state
-from holdfast.twin.loads import Load, LoadState, load_state
+from holdfast.twin.loads import Load, LoadState, draw_arm_motions, load_state
 from holdfast.twin.magnetic_faults import WITHOUT_FAULTS, MagneticFaults
 from holdfast.twin.objects import GraspObject, object_named
 from holdfast.twin.operator import draw_disturbances, draw_tremor
 from holdfast.twin.plant import MILD, plant_named
-from holdfast.twin.profile import Profile, profile
+from holdfast.twin.profile import GRASP_ATTEMPTS, Profile, profile
 from holdfast.twin.protocol import (
     MIN_TOUCH_LOAD,
     THUMB_SHARE,
@@ -43,6 +49,9 @@ from holdfast.twin.world import TruthLog, World, fingertip_of
 
 RETRY_DEPTH_FACTOR = 0.75
 """Factor of the depths of disturbances after a failed grasp, as a person disturbs the next less."""
+MAX_EASED, N_EASED_ALONE = 8, 3
+"""How often a grasp is made until nothing slides, before all is drawn anew; and how often only what
+acts is weaker. An object that is nearly too heavy for the grip needs a firmer one, too."""
 GRASP_CASES = (1, 2)
 """1: close, hold, release. 2: the same with disturbances while the object is locked."""
 MAX_DURATION, MAX_UNHELD_DURATION = 60.0, 25.0
@@ -175,9 +184,10 @@ class Simulation:
         rate = plant.jerk_rate if grasp.glitch_rate is None else grasp.glitch_rate
         if rate is not None:
             chosen = msgspec.structs.replace(chosen, glitch_rate=rate)
-        self.grasp, self._profile, self._loads = grasp, chosen, loads
+        self.grasp, self._profile = grasp, chosen
         self.plan = plan or draw_plan(grasp, chosen)
-        self.world = _world(grasp, chosen)
+        self._loads = [*self.plan.loads, *loads]
+        self.world = _world(grasp, chosen, self.plan.glitch_size)
         tip, skin = grasp.fingertip, parameters or UskinParameters()
         self.skins = {f: _skin(grasp.seed, f, tip, skin, chosen.coupled) for f in FINGERS}
         self.protocol = Protocol(self.plan, 1 / RATE)
@@ -310,7 +320,7 @@ class Simulation:
     def recording(self) -> Recording:
         """Return the recording so far, with truth and labels."""
         grasp, times = self.grasp, np.arange(self.n_samples) / RATE
-        truth = self._truth(times)
+        truth = self.truth()
         taxel_forces = np.array(self._taxel_forces)
         glitch = LabelRule.glitch if self._profile.label_glitches else None
         rule = LabelRule(margin=self._profile.label_margin, glitch=glitch)
@@ -340,10 +350,11 @@ class Simulation:
             metadata["magnetic_faults"] = asdict(grasp.faults)
         return Recording(name, modules, metadata, truth)
 
-    def _truth(self, times: Array) -> Truth:
-        """Return the truth of all samples, in which disturbances last from touch to touch."""
+    def truth(self) -> Truth:
+        """Return the truth so far, in which disturbances last from touch to touch."""
         from scipy.spatial.transform import Rotation
 
+        times = np.arange(self.n_samples) / RATE
         truth, bodies = self._truth_log.truth(times), np.array(self._bodies)
         push = np.linalg.norm(truth.hand["outside_force"], axis=1)  # the only other contact then
         if "outside_torque" in truth.hand:
@@ -379,12 +390,44 @@ def simulate(
     Raises:
         ValueError: object, profile, case or sensor is unknown, or the object cannot be grasped.
     """
-    simulation = Simulation(grasp, parameters)
+    plan = None
+    if profile(grasp.profile).without_slips:
+        grasp, plan = without_slips(grasp, parameters)
+    simulation = Simulation(grasp, parameters, plan=plan)
     while not simulation.is_over:
         simulation.step()
         if on_sample is not None and simulation.command is not None:
             on_sample(simulation.world, simulation.command)
     return simulation.recording()
+
+
+def without_slips(grasp: Grasp, parameters: UskinParameters | None = None) -> tuple[Grasp, Plan]:
+    """Return a grasp and its plan by which no finger slides 0.1 mm.
+
+    Whatever made a finger slide is weaker when the grasp is made again, as `Plan.eased` says, and
+    after a few times the grip is firmer: a person who feels the object slide pushes less there,
+    and holds it better. After `MAX_EASED` times, all numbers are drawn anew as for another attempt.
+
+    Raises:
+        ValueError: something slides however often the grasp is made.
+    """
+    for attempt in range(grasp.attempt, grasp.attempt + GRASP_ATTEMPTS):
+        drawn = replace(grasp, attempt=attempt)
+        plan = draw_plan(drawn, profile(grasp.profile))
+        for n_made in range(MAX_EASED):
+            simulation = Simulation(drawn, parameters, plan=plan)
+            while not simulation.is_over:
+                simulation.step()
+            lock, truth = simulation.protocol.locked_at, simulation.truth()
+            if lock is None:  # never closed
+                break
+            slips = [slip for finger in FINGERS for slip in finger_slips(truth, finger)]
+            onsets = np.array([s.onset for s in slips if s.distance >= MIN_SLIP_DISTANCE])
+            if not onsets.size and not simulation.protocol.failed:
+                return drawn, plan
+            shaken = glitches(truth, LabelRule())[np.searchsorted(truth.times, onsets)]
+            plan = plan.eased(onsets - lock, shaken, firmer=n_made >= N_EASED_ALONE)
+    raise ValueError(f"{grasp.name}: something slides in each of {GRASP_ATTEMPTS} attempts")
 
 
 def draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
@@ -407,14 +450,18 @@ def draw_plan(grasp: Grasp, chosen: Profile) -> Plan:
         disturbances, events = draw_course(generator, chosen, chosen.slips, factor)
         return plan._replace(disturbances=disturbances, slip_events=events)
     disturbances, impacts = draw_disturbances(generator, chosen, factor), list[Impact]()
+    loads: list[Load] = []
+    ends = [0.0, *(push.end for push in disturbances)]
+    rests = list(zip(ends, [*(push.start for push in disturbances), chosen.hold], strict=True))
+    if chosen.arm is not None:
+        loads = draw_arm_motions(grasp.generator("arm motions"), chosen.arm, rests)
+        rests = [(a, b) for a, b in rests if not any(a <= load.start < b for load in loads)]
     if chosen.impacts is not None:
-        ends = [0.0, *(push.start + push.duration for push in disturbances)]
-        rests = list(zip(ends, [*(push.start for push in disturbances), chosen.hold], strict=True))
         impacts = draw_impacts(grasp.generator("impacts"), chosen.impacts, rests)
-    return plan._replace(disturbances=disturbances, impacts=impacts)
+    return plan._replace(disturbances=disturbances, impacts=impacts, loads=loads)
 
 
-def _world(grasp: Grasp, chosen: Profile) -> World:
+def _world(grasp: Grasp, chosen: Profile, glitch_size: float) -> World:
     item = grasp.item
     generator = grasp.generator("world")
     # The order of the draws is part of the seed.
@@ -423,7 +470,7 @@ def _world(grasp: Grasp, chosen: Profile) -> World:
     plant = plant_named(grasp.plant)
     controller = draw_controller(
         generator, duration, period, chosen.glitch_rate,
-        glitch_error=plant.jerk_size, backlash=plant.backlash,
+        glitch_error=glitch_size * plant.jerk_size, backlash=plant.backlash,
     )  # fmt: skip
     tremors = np.stack([draw_tremor(generator), draw_tremor(generator)])
     start = generator.standard_normal(4) * [*[PLACE_SPREAD] * 3, TURN_SPREAD]

@@ -74,7 +74,7 @@ SLIP_OWN = (
 """Features of a head of slips; the second is one of the head of stability, too."""
 TAXELS = tuple(
     FeatureSpec(kind, transform="relative", seconds=0.02)
-    for kind in kinds_of("second", "mean_second", "ratio")
+    for kind in kinds_of("second", "mean_second", "ratio", "sliding")
 )
 """Features of a head of slips that need the taxels."""
 

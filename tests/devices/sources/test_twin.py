@@ -99,6 +99,20 @@ def test_the_next_repeats_follow(quick):
 
 
 @pytest.mark.parametrize(
+    ("address", "names"),
+    [
+        ("twin:?profile=handling", ("ball-case2-1", "box-case2-2", "can-case2-3")),
+        ("twin:?profile=handling&object=can", ("can-case2-1", "can-case2-2", "can-case2-3")),
+    ],
+)
+def test_handling_takes_one_object_after_the_other(quick, address, names):
+    with open_source(address, speed=0, loop=True) as source:
+        arrivals = list(itertools.islice(source, 30))
+    notices = [arrival.notices for arrival in arrivals if arrival.notices]
+    assert notices == [(f"the twin grasps: {name}",) for name in names]
+
+
+@pytest.mark.parametrize(
     ("n_read", "then"), [(1, [40, 50]), (5, [50, 60]), (11, [50, 60]), (13, [60, 70])]
 )
 def test_a_restart_begins_the_next_grasp_unless_one_has_only_begun(quick, n_read, then):

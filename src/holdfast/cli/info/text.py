@@ -8,7 +8,7 @@ from holdfast.cli.terminal.console import print_line, print_lines, print_paragra
 
 MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
-ANSWERS = {"stable": "STABLE", "slip": "slides"}
+ANSWERS = {"stable": "STABLE", "slip": "slides", "slip_changes": "slides, begun in contact,"}
 """What a finger does from the threshold of a head on."""
 # As the documents of `content_of` name them; an import of them would slow the start of the verb.
 LABELLED_STATES = ("stable", "unstable", "no_contact")
@@ -183,7 +183,7 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     name, texts = head["name"], [head["rule"]]
     if "threshold" in head and not is_own:
         texts.append(_answer(name, "a probability of ", head["threshold"]))
-    if name == "slip":
+    if name in ("slip", "slip_changes"):
         texts.append(f"smoothing {head['smoothing']:g} s, hold {head['hold']:g} s")
     if head["highest"] is not None:
         texts.append(f"speed and distance of slips, up to {head['highest']:.3g} mm/s")
@@ -209,8 +209,8 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
 
 def _answer(name: str, what: str, threshold: float) -> str:
     """Return from which threshold on a head answers yes."""
-    if name == "slip" and threshold == 1:
-        return "reports no slip until it is taught (holdfast teach)"
+    if name != "stable" and threshold == 1:
+        return "no slips until calibrated (holdfast calibrate)"
     return f"{ANSWERS[name]} from {what}{threshold:.3g} on"
 
 

@@ -139,4 +139,8 @@ def calibrated(model: "Model", folder: "TeachingFolder") -> "tuple[Model, bool]"
     except HoldfastError as refusal:
         print_message(f"not calibrated: {refusal}")
         return model, False
-    return result.model, True
+    # Nothing is pushed while it is carried: a threshold of slips from that would alarm too often.
+    silent = result.model.changed(
+        lambda part: part.without_thresholds("slip").without_thresholds("slip_changes")
+    )
+    return silent, True

@@ -41,7 +41,8 @@ class Twin(Player):
 
     Args:
         address: `twin:?object=can&seed=0&case=2&repeat=1&profile=reference&server=false` and
-            `&sensor=uskin-curved`; missing parameters have these values.
+            `&sensor=uskin-curved`; missing parameters have these values. Without `object`, the
+            profile `handling` takes another object in each grasp.
         speed: 1 is real time, 2 is twice as fast, 0 is as fast as samples are read.
         loop: play the next repeat of the grasp at the end.
 
@@ -53,6 +54,8 @@ class Twin(Player):
         # Simulates the next grasp while this one plays; made with the first grasp of a loop.
         self._simulator: _Simulator | None = None
         self._grasp = grasp_of(address)
+        in_turn = profile(self._grasp.profile).without_slips and "object" not in address.parameters
+        self._objects = list(load_objects(None)) if in_turn else [self._grasp.object]
         self._current: list[Recording] = []  # played again when a client restarts it at once
         super().__init__(address.text, speed=speed, loop=loop)
 
@@ -66,15 +69,17 @@ class Twin(Player):
     def chunks_of(self, number: int) -> Iterable[Recording]:
         """Return the chunks of a grasp, and begin to simulate the next one."""
         simulator = self._simulator
-        chunks = iter([simulated(self._grasp)]) if simulator is None else simulator.chunks()
+        first = replace(self._grasp, object=self._objects[0])
+        chunks = iter([simulated(first)]) if simulator is None else simulator.chunks()
         self._current = list(chunks)
-        first = self._current[0]
-        n_failed = first.metadata["attempt"]
+        recording = self._current[0]
+        n_failed = recording.metadata["attempt"]
         failed = f", after {n_failed} failed attempt{'s' * (n_failed > 1)}" if n_failed else ""
-        self._notices.append(f"the twin grasps: {first.name}{failed}")
+        self._notices.append(f"the twin grasps: {recording.name}{failed}")
         if self._loops:
             self._simulator = simulator = simulator or _Simulator()
-            simulator.start(replace(self._grasp, repeat=self._grasp.repeat + number + 1))
+            item = self._objects[(number + 1) % len(self._objects)]
+            simulator.start(replace(first, object=item, repeat=first.repeat + number + 1))
         return self._current
 
     def same_chunks(self) -> Iterator[Recording]:

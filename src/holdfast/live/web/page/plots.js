@@ -154,7 +154,7 @@ export class Plots {
       ? (name) => this.fingers[name].slip_threshold
       : (name) => this.thresholds[name] ?? this.fingers[name].probability_threshold;
     for (const value of new Set(this.shown().map(thresholdOf))) {
-      // A threshold of 1 is that of a model that reports no slip until it is taught.
+      // A threshold of 1 is that of a model that reports no slip until it is calibrated.
       if (Number.isFinite(value) && value < 1) drawLevel(plot, value);
     }
   }
