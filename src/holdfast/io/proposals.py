@@ -1,0 +1,175 @@
+"""What a file does not say, and the options that say it: the proposal of `holdfast import`."""
+
+import re
+import shlex
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+import numpy.typing as npt
+
+from holdfast.errors import RecordingError
+
+MAX_FOUND = 14
+"""Maximum number of lines about what was found."""
+MAX_WIDTH = 100
+"""Maximum length of a line [characters]."""
+
+
+class Choice(msgspec.Struct, frozen=True):
+    """A choice that a layout makes.
+
+    Attributes:
+        what: field of the layout.
+        value: what it is, in words of the options.
+        reason: what speaks for it.
+        is_said: whether the file or the user says it; others need the consent of the user.
+    """
+
+    what: str
+    value: str
+    reason: str
+    is_said: bool = False
+
+
+class Proposal(msgspec.Struct, frozen=True):
+    """Options that import a file.
+
+    Attributes:
+        path: of the file.
+        found: lines about its columns or arrays.
+        choices: of the layout.
+        sensors: option, path of an array or module, and the key of the sensor as it was given, or
+            the name of one that was not.
+        columns: text of `--columns`.
+        axes: text of `--axes`.
+        unit: text of `--unit`.
+        findings: what is wrong with the readings without these options; `accept` does not take them.
+    """
+
+    path: str
+    found: list[str]
+    choices: list[Choice]
+    sensors: list[tuple[str, str, str]]
+    columns: str = ""
+    axes: str = ""
+    unit: str = ""
+    findings: list[str] = []
+
+    def options(self, names: Mapping[str, str]) -> list[str]:
+        """Return the words of a command line.
+
+        Args:
+            names: text of each sensor that was given, by its key.
+        """
+        words = []
+        for option, path, key in self.sensors:
+            name = names.get(key, key)
+            words += [option, f"{path}={name}" if path else name]
+        words += ["--columns", self.columns] if self.columns else []
+        words += [f"--axes={self.axes}"] if self.axes else []
+        return words + (["--unit", self.unit] if self.unit else [])
+
+    def text(self, commands: Sequence[Sequence[str]]) -> str:
+        """Return the text of the proposal.
+
+        Args:
+            commands: words of the commands that import with its options.
+        """
+        width = max(len(choice.what) for choice in self.choices)
+        left = max(len(choice.value) for choice in self.choices)
+        lines = [
+            f"{self.path} does not say its whole layout; it has"
+            if any(not choice.is_said for choice in self.choices)
+            else f"{self.path} cannot be imported as it is; it has",
+            *(f"  {line}" for line in self.found),
+            *self.findings,
+            "what it may be, and what speaks for it:",
+            *(
+                f"  {choice.what:<{width}}  {choice.value:<{min(left, 40)}}  {choice.reason}".rstrip()
+                for choice in self.choices
+            ),
+            "paste this if it is right (docs/importing.md has the options"
+            + (")" if self.findings else "; --accept takes it as it is)")
+            + ":",
+        ]
+        lines = [
+            line if len(line) <= MAX_WIDTH else line[: MAX_WIDTH - 3] + "..." for line in lines
+        ]
+        return "\n".join([*lines, *(f"  {line}" for line in _wrapped(commands))])
+
+
+class ProposalError(RecordingError):
+    """A file does not say its layout: the text has the options that say it.
+
+    Args:
+        proposal: the options.
+
+    Attributes:
+        inputs: paths that the caller gave in place of recordings.
+    """
+
+    def __init__(self, proposal: Proposal) -> None:
+        super().__init__(proposal)
+        self.proposal = proposal
+        self.inputs: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        words = ["holdfast", "import", self.proposal.path, "OUT", *self.proposal.options({})]
+        return self.proposal.text([words])
+
+
+def _wrapped(commands: Sequence[Sequence[str]]) -> list[str]:
+    """Return commands as lines, which a shell joins to one."""
+    lines = [""]
+    for number, words in enumerate(commands):
+        quoted = [shlex.quote(word) for word in words]
+        if number:
+            quoted[0] = f"&& {quoted[0]}"
+        for word in quoted:
+            if lines[-1] and len(lines[-1]) + len(word) > MAX_WIDTH - 6:
+                lines[-1] += " \\"
+                lines.append(f"  {word}")
+            else:
+                lines[-1] += f" {word}" if lines[-1] else word
+    return lines
+
+
+def found_lines(arrays: Mapping[str, Any]) -> list[str]:
+    """Return lines about arrays: names, shapes, first values and ranges; alike names are one.
+
+    Args:
+        arrays: `StoredArray` by name.
+    """
+    alike: dict[tuple[str, object], list[str]] = {}
+    for name, array in arrays.items():
+        alike.setdefault(
+            (re.sub(r"\d+|(?<![a-z])[xyz](?![a-z])", "#", name, flags=re.I), array.shape), []
+        ).append(name)
+    lines = []
+    for (_, shape), names in alike.items():
+        title = names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)})"
+        size = "" if len(shape) == 1 else f"  {shape}"
+        lines.append(
+            f"{title[-60:]}{size}  {_values_text(arrays[name] for name in names)}".rstrip()
+        )
+    more = len(lines) - MAX_FOUND
+    return lines if more <= 0 else [*lines[:MAX_FOUND], f"and {more} more"]
+
+
+def _values_text(arrays: Any) -> str:  # noqa: ANN401
+    """Return the first values of arrays of one kind, and their range."""
+    parts: list[npt.NDArray[Any]] = []
+    for array in arrays:
+        try:
+            parts.append(np.asarray(array.read()).ravel())
+        except RecordingError:
+            return ""
+    if not len(parts[0]) or parts[0].dtype.kind not in "biuf":
+        return ", ".join(map(str, parts[0][:2])) if len(parts) == 1 else ""
+    first = ", ".join(f"{value:.6g}" for value in parts[0][:3].tolist())
+    finite = [part[np.isfinite(part)] for part in parts]
+    low = min((part.min() for part in finite if len(part)), default=np.nan)
+    high = max((part.max() for part in finite if len(part)), default=np.nan)
+    return f"{first}, ...; {low:.6g} to {high:.6g}"
