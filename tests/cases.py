@@ -86,7 +86,7 @@ TABLE = (
     Case("08 --no-metadata", "--topic /anyskin_measurements=anyskin", modules=F1, n=800, rate=100),
     Case("09", "--sensor papillarray", modules={"finger1": 9, "finger2": 9}, n=2000, rate=250,
          values=[("finger1", 5.0, 9, "z", 1.3, 0.03), ("finger2", 2.0, 9, "z", 0.0, 0.03)]),
-    Case("10", "--array observation.tactile=anyskin", "proposes", F1, 240, 30, says=["unit"]),
+    Case("10", "--array observation.tactile=anyskin", modules=F1, n=240, rate=30),
     Case("10", "--array observation.tactile=anyskin --unit N", modules=F1, n=240, rate=30,
          values=[("finger1", 4.0, 3, "z", 1.0, 0.05)]),
     Case("10 --v21", "--array observation.tactile=anyskin --unit N", modules=F1, n=240, rate=30),

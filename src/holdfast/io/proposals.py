@@ -2,6 +2,7 @@
 
 import re
 import shlex
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,6 +14,8 @@ from holdfast.errors import RecordingError
 
 MAX_FOUND = 14
 """Maximum number of lines about what was found."""
+MAX_SHORT = 1e6
+"""Numbers above, such as times of a clock, are shown with all digits."""
 MAX_WIDTH = 100
 """Maximum length of a line [characters]."""
 
@@ -84,7 +87,11 @@ class Proposal(msgspec.Struct, frozen=True):
             if any(not choice.is_said for choice in self.choices)
             else f"{self.path} cannot be imported as it is; it has",
             *(f"  {line}" for line in self.found),
-            *self.findings,
+            *(
+                part
+                for text in self.findings
+                for part in textwrap.wrap(text, MAX_WIDTH, subsequent_indent="  ")
+            ),
             "what it may be, and what speaks for it:",
             *(
                 f"  {choice.what:<{width}}  {choice.value:<{min(left, 40)}}  {choice.reason}".rstrip()
@@ -168,8 +175,12 @@ def _values_text(arrays: Any) -> str:  # noqa: ANN401
             return ""
     if not len(parts[0]) or parts[0].dtype.kind not in "biuf":
         return ", ".join(map(str, parts[0][:2])) if len(parts) == 1 else ""
-    first = ", ".join(f"{value:.6g}" for value in parts[0][:3].tolist())
+    first = ", ".join(_number_text(value) for value in parts[0][:3].tolist())
     finite = [part[np.isfinite(part)] for part in parts]
     low = min((part.min() for part in finite if len(part)), default=np.nan)
     high = max((part.max() for part in finite if len(part)), default=np.nan)
-    return f"{first}, ...; {low:.6g} to {high:.6g}"
+    return f"{first}, ...; {_number_text(low)} to {_number_text(high)}"
+
+
+def _number_text(value: float) -> str:
+    return f"{value:.13g}" if abs(value) > MAX_SHORT else f"{value:.6g}"

@@ -180,6 +180,12 @@ def _format_of(
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
         raise RecordingError(f"{path} does not exist; a file or folder to import expected")
+    if path.is_dir() and any((path / mark).is_file() for mark in ZARR_MARKS):
+        raise RecordingError(
+            f"{path} is a zarr folder, which is not read: write its arrays in Python, as numpy.savez("
+            f"{path.stem + '.npz'!r}, tactile=zarr.open({str(path)!r})['data/tactile'][:], time=...), "
+            f"then import {path.stem}.npz"
+        )
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
@@ -204,7 +210,7 @@ def _format_of(
 
 
 def _refuse_missing(path: Path) -> None:
-    """Refuse a file whose format needs a package that is not installed, or a program.
+    """Refuse a file whose format needs a package that is not installed.
 
     Raises:
         HoldfastError: it is such a file.
@@ -214,12 +220,6 @@ def _refuse_missing(path: Path) -> None:
     if name and (missing := missing_part("importers", name, f"the format {name}")):
         if name not in IMPORTER_PLUGINS.names():
             raise missing
-    if path.is_dir() and any((path / mark).is_file() for mark in ZARR_MARKS):
-        raise RecordingError(
-            f"{path} is a zarr folder, which is not read: write its arrays in Python, as "
-            f"numpy.savez({path.stem + '.npz'!r}, tactile=zarr.open({str(path)!r})['data/tactile'][:], "
-            f"time=...), then import {path.stem}.npz"
-        )
 
 
 def takes_sensors(name: str) -> bool:

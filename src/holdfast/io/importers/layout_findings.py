@@ -22,6 +22,8 @@ ZEROS_SHARE = 0.1
 """Share of samples at which the readings become zero or come back from it."""
 MAX_TAXEL_FORCE = 100.0
 """Force on one taxel above which the unit of the readings is in doubt [N]."""
+MIN_RANGE = 1e-3
+"""Share of the range of a device that its readings span at least, if they are in counts."""
 GRAVITY = {"N": (9.81, 1.0), "count": (16384.0, 8192.0, 4096.0, 1000.0)}
 """Length of the vector of an accelerometer at rest, by the unit of the readings."""
 GRAVITY_TOLERANCE = 0.03
@@ -123,15 +125,20 @@ def _wraps(values: Array) -> Iterator[LayoutFinding]:
 def _units(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:
     """Yield the finding that the readings cannot have the unit of the sensor."""
     lowest, highest = float(values.min()), float(values.max())
-    if skin.unit == "count" and 0 < highest - lowest < 1:
-        text = f"readings between {lowest:.4g} and {highest:.4g} are less than one count apart, "
+    # Counts of a device with a known range are whole numbers, or reach far into it.
+    least = 1.0 if skin.range is None else MIN_RANGE * (skin.range[1] - skin.range[0])
+    is_whole = skin.range is not None and bool((values == np.rint(values)).all())
+    if (values == values[0]).all():  # a sensor that is disconnected
+        return
+    if skin.unit == "count" and highest - lowest < least and not is_whole:
+        text = f"readings between {lowest:.4g} and {highest:.4g} are too close for counts, and so "
         yield LayoutFinding(
-            "unit", text + "and so taken for noise: is their unit N?", "unit=N", True
+            "unit", text + "taken for noise: is their unit N?", "unit=N", stops=True
         )
     largest = max(abs(lowest), abs(highest))
     if skin.unit == "N" and largest > MAX_TAXEL_FORCE:
         text = f"readings up to {largest:.4g} N on a taxel: is their unit mN or count?"
-        yield LayoutFinding("unit", text, "unit=mN", True)
+        yield LayoutFinding("unit", text, "unit=mN", stops=True)
 
 
 def _quantities(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:

@@ -37,10 +37,10 @@ POLAR = {"direction", "angle", "azimuth", "theta", "phi"}
 """Words of the angle of a force that is given by its size and its direction."""
 
 _UNIT = re.compile(
-    r"[\s_]*[\[(]\s*(?P<inside>[^\])]*?)\s*[\])]\s*$"
+    r"[\s_]*[\[(]\s*(?P<inside>[^\])\d][^\])]*?|)\s*[\])]\s*$"
     r"|[\s_](?P<word>N[_ ]?mm|N[_ ]?m|[mu]m|mN|N|[mun]T|counts?|raw|deg|rad|kPa|Pa|g)$"
 )
-_UNIT_NAMES = {"counts": "count", "raw": "count", "lsb": "count", "": None, "-": None, "1": None}
+_UNIT_NAMES = {"counts": "count", "raw": "count", "lsb": "count", "": None, "-": None}
 _FORMS = (
     # The axis before the number of the taxel, as Fx1, mag_x_1 and X[0]; or after it, as 1x, p0_fx.
     re.compile(r"(?P<head>.*?)(?P<axis>[xyz])(?P<mid>[\W_]*)(?P<taxel>\d+)(?P<tail>[\W_]*)", re.I),
@@ -74,7 +74,12 @@ class Group(NamedTuple):
     @property
     def words(self) -> set[str]:
         """Words of the names, in small letters."""
-        return {word.lower() for word in _WORDS.findall(f"{self.head} {self.mid}")}
+        return words_of(f"{self.head} {self.mid}")
+
+
+def words_of(text: str) -> set[str]:
+    """Return the words of a name, in small letters."""
+    return {word.lower() for word in _WORDS.findall(text)}
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
