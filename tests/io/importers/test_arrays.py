@@ -9,9 +9,10 @@ import pytest
 
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
-from holdfast.io.importers.array_conversion import StoredArray, recordings_of_arrays
+from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.stored import StoredArray
 from holdfast.io.importers.arrays import arrays_of_hdf5
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
 from holdfast.sensors import sensor
 
 SKIN = sensor("anyskin")
@@ -328,8 +329,7 @@ def test_an_array_of_several_recordings_is_read_once(tmp_path):
 
     stored = StoredArray((3, 80, 5, 3), "f", values)
     columns = Columns.parse("time=100Hz")
-    made = recordings_of_arrays(
-        tmp_path / "set.h5", {"tactile": stored}, {"tactile": SKIN}, columns, lambda _: None
-    )
+    source = Source(tmp_path / "set.h5", {"tactile": stored})
+    made = recordings_of(source, {"tactile": SKIN}, columns, lambda _: None)
     assert [recording.name for recording in made] == ["set-1", "set-2", "set-3"]
     assert len(reads) == 1

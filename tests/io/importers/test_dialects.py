@@ -8,7 +8,7 @@ import pytest
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers import generic_csv, table
-from holdfast.io.importers.csv_times import clock_seconds
+from holdfast.io.importers.times import clock_seconds
 from holdfast.io.importers.table import read_head
 from holdfast.sensors import sensor
 

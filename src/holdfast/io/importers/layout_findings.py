@@ -4,7 +4,7 @@
 """
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,11 @@ TURNED_SHARE = 0.5
 """Share of the largest change of z that z of a turned taxel falls at least."""
 
 
+LayoutKind = Literal[
+    "unit", "sentinel", "zeros", "unsigned", "wraps", "gravity", "angle", "norm", "turned"
+]  # fmt: skip
+
+
 class LayoutFinding(NamedTuple):
     """A property of readings that their layout explains.
 
@@ -42,14 +47,23 @@ class LayoutFinding(NamedTuple):
         stops: whether it makes every state wrong.
     """
 
-    kind: str
+    kind: LayoutKind
     text: str
     option: str = ""
     stops: bool = False
 
+    @property
+    def advice(self) -> str:
+        """The finding with the option of an import that mends it."""
+        what, _, value = self.option.partition("=")
+        option = f"--{what} {value}" if what == "unit" else f"--columns {self.option}"
+        return f"{self.text}; import it with {option}" if value else self.text
 
-def layout_findings(readings: npt.NDArray[np.generic], skin: Sensor) -> list[LayoutFinding]:
-    """Return the findings about readings (n, n_taxels, 3) of a sensor.
+
+def layout_findings(
+    readings: npt.NDArray[np.generic], skin: Sensor, unit: str | None = None
+) -> list[LayoutFinding]:
+    """Return the findings about readings (n, n_taxels, 3) of a sensor, in its unit or another.
 
     Example:
         >>> from holdfast.sensors import flat_sensor
@@ -63,7 +77,8 @@ def layout_findings(readings: npt.NDArray[np.generic], skin: Sensor) -> list[Lay
     if first := next(_sentinels(values, skin), None):
         return [first]  # it hides all others
     values = filled(values)
-    return [*_wraps(values), *_units(values, skin), *_quantities(values, skin)]
+    unit = unit or skin.unit
+    return [*_wraps(values), *_units(values, skin, unit), *_quantities(values, skin, unit)]
 
 
 def _sentinels(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:
@@ -122,7 +137,7 @@ def _wraps(values: Array) -> Iterator[LayoutFinding]:
             return
 
 
-def _units(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:
+def _units(values: Array, skin: Sensor, unit: str) -> Iterator[LayoutFinding]:
     """Yield the finding that the readings cannot have the unit of the sensor."""
     lowest, highest = float(values.min()), float(values.max())
     # Counts of a device with a known range are whole numbers, or reach far into it.
@@ -130,21 +145,21 @@ def _units(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:
     is_whole = skin.range is not None and bool((values == np.rint(values)).all())
     if (values == values[0]).all():  # a sensor that is disconnected
         return
-    if skin.unit == "count" and highest - lowest < least and not is_whole:
+    if unit == "count" and highest - lowest < least and not is_whole:
         text = f"readings between {lowest:.4g} and {highest:.4g} are too close for counts, and so "
         yield LayoutFinding(
             "unit", text + "taken for noise: is their unit N?", "unit=N", stops=True
         )
     largest = max(abs(lowest), abs(highest))
-    if skin.unit == "N" and largest > MAX_TAXEL_FORCE:
+    if unit == "N" and largest > MAX_TAXEL_FORCE:
         text = f"readings up to {largest:.4g} N on a taxel: is their unit mN or count?"
         yield LayoutFinding("unit", text, "unit=mN", stops=True)
 
 
-def _quantities(values: Array, skin: Sensor) -> Iterator[LayoutFinding]:
+def _quantities(values: Array, skin: Sensor, unit: str) -> Iterator[LayoutFinding]:
     """Yield findings about numbers that are no x, y and z of a force or field."""
     norm = np.sqrt((values**2).sum(axis=2))
-    for length in GRAVITY[skin.unit]:
+    for length in GRAVITY[unit]:
         near = np.abs(norm.mean(axis=0) / length - 1) < GRAVITY_TOLERANCE
         if near.all() and 0 < norm.std() < GRAVITY_TOLERANCE * length:
             text = f"all vectors have the length {length:g}, as gravity: an accelerometer?"

@@ -49,8 +49,10 @@ _FORMS = (
         r"(?P<tail>[\W_]*)",
         re.IGNORECASE,
     ),
+    # No number: the one taxel of a module.
+    re.compile(r"(?P<head>.*?)(?P<axis>[xyz])(?P<tail>[\W_]*)", re.IGNORECASE),
 )
-_ONE_TAXEL = re.compile(r"(?P<head>.*?)(?P<axis>[xyz])(?P<tail>[\W_]*)", re.IGNORECASE)
+_ONE_TAXEL = len(_FORMS) - 1
 _WORDS = re.compile(r"[a-z]+", re.IGNORECASE)
 _PLACEHOLDERS = {
     "{module}": r"(?P<module>.+?)",
@@ -94,7 +96,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
         return name, None
     unit = match["inside"] if match["inside"] is not None else match["word"]
     unit = re.sub("[\N{MICRO SIGN}\N{GREEK SMALL LETTER MU}]", "u", unit)
-    return name[: match.start()], _UNIT_NAMES.get(unit.lower(), unit)
+    return name[: match.start()].rstrip(" ,"), _UNIT_NAMES.get(unit.lower(), unit)
 
 
 def quantity_of(words: Collection[str]) -> str | None:
@@ -118,32 +120,37 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
         RecordingError: a group lacks a column.
     """
     found: dict[Group, dict[tuple[int, str], str]] = {}
+    doubled: dict[Group, tuple[str, str]] = {}
     for name in names:
         if len(name) > MAX_NAME:
             continue
         bare, unit = split_unit(name)
         for form, pattern in enumerate(_FORMS):
             if match := pattern.fullmatch(bare):
-                group = Group(form, match["head"], match["mid"], match["tail"], unit)
-                found.setdefault(group, {})[int(match["taxel"]), match["axis"].lower()] = name
-        if match := _ONE_TAXEL.fullmatch(bare):
-            group = Group(len(_FORMS), match["head"], "", match["tail"], unit)
-            found.setdefault(group, {})[FIRST_TAXEL, match["axis"].lower()] = name
+                parts = match.groupdict()
+                taxel = int(parts.get("taxel", FIRST_TAXEL))
+                group = Group(form, parts["head"], parts.get("mid", ""), parts["tail"], unit)
+                other = found.setdefault(group, {}).setdefault((taxel, parts["axis"].lower()), name)
+                if other != name:
+                    doubled[group] = other, name
     groups = {}
     for group, cells in found.items():
         numbers = sorted({taxel for taxel, _ in cells})
         whole = [(taxel, axis) for taxel in numbers for axis in "xyz"]
         is_run = numbers[-1] - numbers[0] == len(numbers) - 1
         fits = (
-            len(numbers) in n_taxels if n_taxels else len(numbers) > 1 or group.form == len(_FORMS)
+            len(numbers) in n_taxels if n_taxels else len(numbers) > 1 or group.form == _ONE_TAXEL
         )
         if is_run and fits and len(cells) == len(whole):
+            if group in doubled:
+                a, b = doubled[group]
+                raise RecordingError(f"columns {a!r} and {b!r} are the same taxel and axis")
             first = numbers[0]
             groups[group] = {(taxel_number(t - first), axis): n for (t, axis), n in cells.items()}
         elif fits and len(whole) > len(cells) > 0.9 * len(whole):
             taxel, axis = next(cell for cell in whole if cell not in cells)
             missing = re.sub(
-                f"[xyz](?!.*[xyz])", axis, cells[next(c for c in cells if c[0] == taxel)]
+                "[xyz](?!.*[xyz])", axis, cells[next(c for c in cells if c[0] == taxel)]
             )
             raise RecordingError(f"column {missing!r} is missing: taxel {taxel} has no {axis}")
     return groups
@@ -162,9 +169,15 @@ def module_names(groups: Sequence[Group]) -> list[str]:
     return different_parts([f"{group.head} {group.mid}" for group in groups])
 
 
-def different_parts(texts: Sequence[str]) -> list[str]:
-    """Return the parts in which texts differ, in whole words; the texts if a part is empty."""
-    words = [re.findall(r"[A-Za-z]*\d+|[A-Za-z]+|[^A-Za-z\d]+", text) for text in texts]
+def different_parts(texts: Sequence[str], *, by_group: bool = False) -> list[str]:
+    """Return the parts in which texts differ, in whole words; the texts if a part is empty.
+
+    Args:
+        texts: names, or paths with slashes.
+        by_group: of paths, the names of groups are whole.
+    """
+    pattern = r"[^/]+|/" if by_group else r"[A-Za-z]*\d+|[A-Za-z]+|[^A-Za-z\d]+"
+    words = [re.findall(pattern, text) for text in texts]
     start = len(_common(words))
     end = len(_common([word[start:][::-1] for word in words]))
     parts = ["".join(word[start : len(word) - end]).strip(" _.-/") for word in words]

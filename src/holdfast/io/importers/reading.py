@@ -380,17 +380,17 @@ class _Reader:
         modules = recordings[0].modules
         rate = next(iter(modules.values())).rate
         names = ", ".join(f"{name} {one.sensor.n_taxels} taxels" for name, one in modules.items())
-        said = [
-            f"{c.what} {c.value} {c.reason}"
-            for c in self.layout.choices
-            if c.what in ("time", "unit")
-        ]
+        said = {choice.what: choice for choice in self.layout.choices}
+        time, unit = said.get("time"), said.get("unit")
+        by = f" by {time.value}" if time and time.value != f"{rate:g}Hz" else ""
+        by += f" ({time.reason})" if time and time.reason not in ("by its name", "as given") else ""
+        unit_text = f"; unit {unit.value}" if unit else ""
         used = self.layout.used.union(*(track.used for track in self._tracks))
         last = {name.rpartition("/")[2] for name in used}
         unused = [
             n for n in self.layout.arrays if n not in used and n.rpartition("/")[2] not in last
         ]
-        return f"{rate:.4g} Hz, {names}; {'; '.join(said)}; not used: {first_texts(unused)}"
+        return f"{rate:.4g} Hz{by}; {names}{unit_text}; not used: {first_texts(unused)}"
 
 
 def _picked(values: Array, axes: tuple[int, ...]) -> Array:

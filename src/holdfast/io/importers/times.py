@@ -74,7 +74,7 @@ def time_names(names: Sequence[str]) -> list[str]:
         >>> time_names(["step", "ros_time_ns", "t_us", "t_wall [s]", "x1"])
         ['t_us', 'ros_time_ns', 't_wall [s]']
     """
-    unit = re.compile(rf"[\W_]*\b({'|'.join(_UNIT_WORDS)})\b\W*$")
+    unit = re.compile(r"[\W_]*\b(s|sec|ms|us|\N{MICRO SIGN}s|ns|min|h|d)\b\W*$")
     bare = {unit.sub("", re.sub(r"[\W_]+", " ", name).strip().lower()): name for name in names}
     usual = [bare[name] for name in _NAMES if name in bare]
     parts = [n for n in names if "time" in n.lower() or "stamp" in n.lower()]

@@ -208,6 +208,9 @@ def table_tracks(layout: Layout, columns: StoredArrays, beside: StoredArrays) ->
 def _stacked(
     columns: StoredArrays, names: Sequence[str], shape: tuple[int, ...]
 ) -> npt.NDArray[Any]:
+    if texts := [name for name in names if columns[name].kind == "U"]:
+        cell = columns[texts[0]].read()[0]
+        raise RecordingError(f"column {texts[0]!r}: {cell[:40]!r} given, a number expected")
     return np.stack([columns[name].read().reshape(-1) for name in names], axis=1).reshape(shape)
 
 
@@ -354,12 +357,21 @@ def rate_beside(layout: Layout, track: Track) -> str | None:
 
 
 class _Axes(NamedTuple):
-    """How the axes of an array are understood: that of the samples, and number of modules."""
+    """How the axes of an array are understood.
+
+    Attributes:
+        axis: that of the samples.
+        n_samples: its size.
+        n_modules: number of modules.
+        is_episodes: whether the axis before counts recordings.
+        is_turned: whether the taxels are after x, y and z.
+    """
 
     axis: int
     n_samples: int
     n_modules: int
     is_episodes: bool = False
+    is_turned: bool = False
 
 
 class _ArrayFinder:
@@ -380,56 +392,55 @@ class _ArrayFinder:
             raise RecordingError(f"no array {key!r}; it has {listed(self._arrays)}")
         readings = [name for name in named if self.is_reading(name)]
         wide = [name for name in readings if len(self._arrays[name].shape) > 1]
-        if key != ANY_MODULE and (key in self._arrays or len(wide) == 1 or len(named) == 1):
+        is_clear = key in self._arrays or len(wide) == 1 or len(named) == 1
+        if is_clear and (key != ANY_MODULE or self._layout.columns.taxels):
             return self._at([key if key in self._arrays else (wide or named)[0]], skin, module)
-        fitting = [name for name in readings if self._axes(name, skin, is_exact=False)]
-        if len(fitting) > 1:
-            names = different_parts(fitting)
-            groups = {name.rpartition("/")[0] for name in fitting}
-            ends = [f"-{name}" for name in names]
-            if len(groups) == len(fitting) and all(map(_RECORDING.fullmatch, names)):
-                names = [module] * len(names)
-            elif are_fingers(names):
-                ends = [""] * len(names)
-                self._layout.choose(
-                    "fingers", ", ".join(names), "by the names of arrays", is_said=True
-                )
-            else:
-                names = []
-            if names:
-                parts = zip(fitting, names, ends, strict=True)
-                return [
-                    t
-                    for path, name, end in parts
-                    for t in self._at([path], skin, name, end, is_exact=False)
-                ]
-        elif fitting:
-            return self._at(fitting, skin, module, is_exact=False)
-        elif tracks := self._of_columns(named, skin):
+        fitting = [name for name in readings if self._fits(name, skin)]
+        if not fitting and (tracks := self._of_columns(named, skin)):
             return tracks
-        loose = [n for n in readings if self._axes(n, skin) or self._group(n, skin)]
-        if not (fitting or loose):
-            if len(readings) == 1:
-                raise self._misfit(readings[0], skin)
+        is_said = bool(fitting)
+        fitting = fitting or [n for n in readings if self._axes(n, skin) or self._group(n, skin)]
+        if not fitting and len(readings) == 1:
+            raise self._misfit(readings[0], skin)
+        if not fitting:
             others = [f"{n} is a {what}" for n in named if (what := self._quantity(n))]
             raise RecordingError(
                 f"it has {listed(self._arrays)}; none has {skin.n_taxels} taxels x 3 axes a sample "
                 f"({skin.name}): give another sensor; {'; '.join([*others[:2], THREE_AXES])}"
             )
-        best = next(
-            (n for n in fitting or loose if words_of(n) & FORCE_WORDS), (fitting or loose)[0]
-        )
-        slash = "/" if self._layout.source.option == "--topic" else ""
-        option = (self._layout.source.option, f"{slash}{best}", option_key)
-        self._layout.options = [
-            option if k == option_key else (o, p, k) for o, p, k in self._layout.options
-        ]
-        rest = [name for name in fitting if name != best]
-        reason = f"{skin.n_taxels} taxels in shape {self._arrays[best].shape}"
-        self._layout.choose(
-            "array", best, reason + (f"; {first_texts(rest)} would fit, too" if rest else "")
-        )
-        return self._at([best], skin, module)
+        parts = different_parts(fitting, by_group=True)
+        names, ends = [module] * len(fitting), [f"-{part}" for part in parts]
+        if len(fitting) == 1 or not all(map(_RECORDING.fullmatch, parts)):
+            ends = [""] * len(fitting)
+        if len(fitting) > 1 and not any(ends):
+            names = different_parts(fitting)
+            if are_fingers(names):
+                self._layout.choose("fingers", ", ".join(names), "by the names", is_said=True)
+            else:
+                best = next((n for n in fitting if words_of(n) & FORCE_WORDS), fitting[0])
+                rest = first_texts([name for name in fitting if name != best])
+                self._layout.choose("array", best, f"by its name; {rest} would fit, too")
+                fitting, names, is_said = [best], [module], False
+        if not is_said:
+            self._propose_arrays(fitting, option_key, skin)
+        found = zip(fitting, names, ends, strict=True)
+        return [track for path, name, end in found for track in self._at([path], skin, name, end)]
+
+    def _propose_arrays(self, paths: Sequence[str], key: str, skin: Sensor) -> None:
+        """Propose arrays for the sensor of a key."""
+        layout, option = self._layout, self._layout.source.option
+        slash = "/" if option == "--topic" else ""
+        options = [(option, f"{slash}{path}", key) for path in paths]
+        layout.options = [*options, *(one for one in layout.options if one[2] != key)]
+        if not any(choice.what == "array" for choice in layout.choices):
+            shape = self._arrays[paths[0]].shape
+            layout.choose("array", ", ".join(paths), f"{skin.n_taxels} taxels in shape {shape}")
+
+    def _fits(self, name: str, skin: Sensor) -> bool:
+        """Return whether an array has the taxels of a sensor by its last axes, or by names."""
+        words = self._arrays[name].columns
+        is_named = bool(words) and bool(named_groups(words, {skin.n_taxels}))
+        return is_named or self._axes(name, skin, is_exact=False) is not None
 
     def is_reading(self, name: str) -> bool:
         """Return whether an array may be readings by its name."""
@@ -499,6 +510,8 @@ class _ArrayFinder:
                     size = 3 if self._layout.columns.axes is None else rest[-1] // n_taxels
                     n_modules = prod(rest) // max(n_taxels * size, 1)
                     fits = size > 0 and n_modules > 0 and rest[-1] % (n_taxels * size) == 0
+                if rest == (3, n_taxels) != (3, 3) and is_exact:
+                    return _Axes(axis, shape[axis], 1, is_episodes, is_turned=True)
                 if fits and (n_modules == 1 or not is_episodes):
                     return _Axes(axis, shape[axis], n_modules, is_episodes)
         return None
@@ -512,15 +525,7 @@ class _ArrayFinder:
         )
         return array.shape[-1] if is_wide else 0
 
-    def _at(
-        self,
-        paths: Sequence[str],
-        skin: Sensor,
-        module: str,
-        end: str = "",
-        *,
-        is_exact: bool = True,
-    ) -> list[Track]:
+    def _at(self, paths: Sequence[str], skin: Sensor, module: str, end: str = "") -> list[Track]:
         """Return the tracks of an array, or of arrays that are laid beside each other."""
         layout, path, array = self._layout, paths[0], self._arrays[paths[0]]
         if array.kind == "O":
@@ -538,10 +543,16 @@ class _ArrayFinder:
                 return [
                     one._replace(modules=tuple(m or module for m in one.modules)) for one in tracks
                 ]
-        axes = [self._axes(one, skin, is_exact=is_exact) for one in paths]
+        axes = [self._axes(one, skin) for one in paths]
         if len(paths) > 1:
             sizes = [self._arrays[one].shape[0] for one in paths]
             axes = [_Axes(0, n, 1) if len(set(sizes)) == 1 else None for n in sizes]
+        is_timed = axes[0] is None and array.shape[1:] == (3 * skin.n_taxels + 1,)
+        if is_timed and not layout.columns.time and (np.diff(array.read()[:, 0]) > 0).all():
+            last = array.shape[1]
+            layout.columns = replace(layout.columns, time="1", taxels=f"2{RUN}{last}")
+            layout.choose("time", "1", "the first number of each sample grows")
+            return self._at(paths, skin, module, end)
         if axes[0] is None and self._group(path, skin):
             values = np.asarray(array.read(), dtype=np.float64).reshape(-1, array.shape[-1])
             numbers, reason = likely_axes(values)
@@ -569,7 +580,8 @@ class _ArrayFinder:
         for k in range(array.shape[0] if first.is_episodes else 1):
             part = (k,) if first.is_episodes else ()
             at = first.axis - len(part)
-            values = partial(_arranged, reads, part, at, (first.n_samples, n, skin.n_taxels, -1))
+            size = (first.n_samples, n, skin.n_taxels, -1)
+            values = partial(_arranged, reads, part, at, size, is_turned=first.is_turned)
             near = {}
             for name, other in beside.items():
                 if part and other.shape[:2] == array.shape[:2]:
@@ -638,11 +650,14 @@ def _arranged(
     part: tuple[int, ...],
     axis: int,
     shape: tuple[int, ...],
+    *,
+    is_turned: bool,
 ) -> npt.NDArray[Any]:
     """Return (n, n_modules, n_taxels, numbers of a taxel) of arrays, beside each other."""
-    return np.concatenate(
-        [np.moveaxis(read()[part], axis, 0).reshape(shape) for read in reads], axis=-1
-    )
+    parts = [np.moveaxis(read()[part], axis, 0) for read in reads]
+    if is_turned:
+        parts = [values.swapaxes(-1, -2) for values in parts]
+    return np.concatenate([values.reshape(shape) for values in parts], axis=-1)
 
 
 def likely_axes(values: npt.NDArray[Any]) -> tuple[tuple[int, int, int], str]:

@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from holdfast.detection.plan import first_finite
+from holdfast.io.importers.layout_findings import LayoutFinding, layout_findings
 from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.fingertip_forces import force_sensor
 from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
@@ -13,6 +14,8 @@ from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import HELD_ROWS, held_rows
 from holdfast.sensors.types import Array, Flags
 
+LAYOUT_SAMPLES = 20_000
+"""Number of samples at the beginning that the findings about the layout are based on."""
 SCAN_BLOCK_SAMPLES = 4096
 """Samples that are compared and summed at a time: bounds the memory."""
 
@@ -30,6 +33,7 @@ class ModuleScan:
         lowest: of all readings [unit of the readings].
         highest: of all readings [unit of the readings].
         rows_per_update: rows in which each sample comes, in the first part; 1 if in one.
+        layout: findings about the layout of the readings, in the first part.
     """
 
     def __init__(self, module: Tactile) -> None:
@@ -38,6 +42,7 @@ class ModuleScan:
         self.still: Flags = np.ones(3, dtype=np.bool_)
         self.lowest, self.highest = np.inf, -np.inf
         self.rows_per_update = 1.0
+        self.layout: list[LayoutFinding] = []
         # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
         # of its times, and its last sample. The first finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
@@ -62,6 +67,8 @@ class ModuleScan:
             if not self._last.size:
                 readings = module.readings[:HELD_ROWS]
                 self.rows_per_update = held_rows(readings, module.sensor, module.rate) or 1.0
+                first = module.readings[:LAYOUT_SAMPLES]
+                self.layout = layout_findings(first, module.sensor, module.unit)
             self._times.append(module.times)
             self._end = float(module.times[-1])
         for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):
