@@ -180,8 +180,8 @@ def print_proposal(cause: "ProposalError", words: Sequence[str]) -> None:
         print_message(line)
 
 
-def refuse_foreign(path: Path) -> None:
-    """Propose the import of a file of another logger where a recording is expected.
+def refuse_foreign(paths: Sequence[Path]) -> None:
+    """Propose the import of a file of another logger where recordings are expected.
 
     Raises:
         RecordingError: the text has the command that imports it.
@@ -191,19 +191,18 @@ def refuse_foreign(path: Path) -> None:
     from holdfast.io.importers import import_recordings
     from holdfast.io.proposals import ProposalError
 
-    if not path.is_file() or is_recording(path):
-        return
-    try:
-        next(iter(import_recordings(path)))
-    except ProposalError as cause:
-        cause.inputs = (str(path),)
-        raise
-    except (HoldfastError, ValueError):
-        return  # the verb says what it expects
-    raise HoldfastError(
-        f"{path} is no recording of holdfast: holdfast import {shlex.quote(str(path))} recordings "
-        "makes one"
-    )
+    for path in paths:
+        if not path.is_file() or is_recording(path):
+            continue
+        try:
+            next(iter(import_recordings(path)))
+        except ProposalError as cause:
+            cause.inputs = (str(path),)
+            raise
+        except (HoldfastError, ValueError, StopIteration):
+            continue  # the verb says what it expects
+        command = shlex.join(["holdfast", "import", str(path), "recordings"])
+        raise HoldfastError(f"{path} is no recording of holdfast: {command} makes one")
 
 
 def report_findings(recordings: "Iterable[tuple[str, Iterable[Finding]]]") -> None:

@@ -131,7 +131,12 @@ def _wrapped(commands: Sequence[Sequence[str]]) -> list[str]:
     """Return commands as lines, which a shell joins to one."""
     lines = [""]
     for number, words in enumerate(commands):
-        quoted = [shlex.quote(word) for word in words]
+        quoted: list[str] = []
+        for before, word in zip(("", *words), words, strict=False):
+            is_value = before.startswith("--") and "=" not in before and not word.startswith("--")
+            # An option and its value stay in one line.
+            text = f"{quoted.pop()} {shlex.quote(word)}" if is_value else shlex.quote(word)
+            quoted.append(text)
         if number:
             quoted[0] = f"&& {quoted[0]}"
         for word in quoted:

@@ -70,7 +70,9 @@ def test_names_of_fingers(names):
     assert are_fingers(names)
 
 
-@pytest.mark.parametrize("names", [("d", "f"), ("A", "G"), ("force", "displacement"), ("raw", "lp")])
+@pytest.mark.parametrize(
+    "names", [("d", "f"), ("A", "G"), ("force", "displacement"), ("raw", "lp")]
+)
 def test_other_words_may_be_other_quantities(names):
     assert not are_fingers(names)
 

@@ -96,7 +96,8 @@ def recordings_of(
     choices = reader.layout.choices
     if findings or not (accept or all(choice.is_said for choice in choices)):
         raise ProposalError(reader.proposal(findings))
-    for line in (*source.notes, *reader.notes, reader.summary(recordings)):
+    summary = [] if source.stated else [reader.summary(recordings)]  # holdfast's own says it all
+    for line in (*source.notes, *reader.notes, *summary):
         report(f"{source.path.name}: {line}")
     return recordings
 

@@ -128,9 +128,9 @@ def times_of(name: str, values: Array, unit: str | None, nominal: float) -> Time
             f"{low:g} to {high:g} Hz expected: give --columns time={name}:{likely} "
             f"({its_rate:.4g} Hz), or the unit that is true"
         )
-    reason = f"steps of {step:.6g} are {its_rate:.4g} Hz in {likely}, {rate:.4g} Hz in s"
+    reason = f"steps of {step:.6g}: {its_rate:.4g} Hz in {likely}, {rate:.4g} Hz in s"
     if step == 1:
-        reason += "; time=100Hz with the true rate if it counts samples"
+        reason += "; time=100Hz if it counts samples"
     return Times(values * TIME_UNITS[likely], likely, reason)
 
 
@@ -207,8 +207,10 @@ def true_rate(times: Array) -> float | None:
     """
     steps = np.diff(times)
     step = float(np.median(steps)) if len(steps) else 0.0
-    if not step > 0:
-        step = float(times[-1] - times[0]) / max(len(steps), 1)
+    changes = np.flatnonzero(steps > 0) + 1
+    if not step > 0 and len(changes) > 1:
+        first, last = changes[0], changes[-1]
+        step = float(times[last] - times[first]) / (last - first)
     rate = 1 / step if step > 0 else 0.0
     low, high = POSSIBLE_RATES
     return float(f"{rate:.3g}") if low <= rate <= high else None

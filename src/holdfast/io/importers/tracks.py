@@ -399,7 +399,8 @@ class _ArrayFinder:
         if not fitting and (tracks := self._of_columns(named, skin)):
             return tracks
         is_said = bool(fitting)
-        fitting = fitting or [n for n in readings if self._axes(n, skin) or self._group(n, skin)]
+        ways = (self._axes, self._group, self._is_timed)
+        fitting = fitting or [n for n in readings if any(way(n, skin) for way in ways)]
         if not fitting and len(readings) == 1:
             raise self._misfit(readings[0], skin)
         if not fitting:
@@ -420,7 +421,7 @@ class _ArrayFinder:
                 best = next((n for n in fitting if words_of(n) & FORCE_WORDS), fitting[0])
                 rest = first_texts([name for name in fitting if name != best])
                 self._layout.choose("array", best, f"by its name; {rest} would fit, too")
-                fitting, names, is_said = [best], [module], False
+                fitting, names, ends, is_said = [best], [module], [""], False
         if not is_said:
             self._propose_arrays(fitting, option_key, skin)
         found = zip(fitting, names, ends, strict=True)
@@ -525,6 +526,12 @@ class _ArrayFinder:
         )
         return array.shape[-1] if is_wide else 0
 
+    def _is_timed(self, name: str, skin: Sensor) -> bool:
+        """Return whether the first number of each sample of a flat array is its time."""
+        array, columns = self._arrays[name], self._layout.columns
+        is_wider = array.shape[1:] == (3 * skin.n_taxels + 1,) and array.kind in "iuf"
+        return is_wider and not columns.time and bool((np.diff(array.read()[:, 0]) > 0).all())
+
     def _at(self, paths: Sequence[str], skin: Sensor, module: str, end: str = "") -> list[Track]:
         """Return the tracks of an array, or of arrays that are laid beside each other."""
         layout, path, array = self._layout, paths[0], self._arrays[paths[0]]
@@ -547,8 +554,7 @@ class _ArrayFinder:
         if len(paths) > 1:
             sizes = [self._arrays[one].shape[0] for one in paths]
             axes = [_Axes(0, n, 1) if len(set(sizes)) == 1 else None for n in sizes]
-        is_timed = axes[0] is None and array.shape[1:] == (3 * skin.n_taxels + 1,)
-        if is_timed and not layout.columns.time and (np.diff(array.read()[:, 0]) > 0).all():
+        if axes[0] is None and self._is_timed(path, skin):
             last = array.shape[1]
             layout.columns = replace(layout.columns, time="1", taxels=f"2{RUN}{last}")
             layout.choose("time", "1", "the first number of each sample grows")
