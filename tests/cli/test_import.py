@@ -187,7 +187,7 @@ class TestASensorOfOnesOwn:
         assert (module.sensor.name, module.rate) == ("grid-3x3", pytest.approx(100.0))
 
     def test_a_sensor_by_module_and_columns(self, capsys, press, grid, tmp_path):
-        columns = "time=timestamp:ms,taxels=F{axis}{taxel}"
+        columns = "time=timestamp:ms,taxels=Fx0..Fz8"
         words = ["--sensor", f"finger1={grid}", "--columns", columns]
         imported(capsys, press / "a.csv", tmp_path / "out", *words)
         assert (tmp_path / "out" / "a.parquet").exists()

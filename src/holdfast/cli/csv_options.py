@@ -42,8 +42,8 @@ class CsvOptions:
     columns: Annotated[
         str | None,
         typer.Option(
-            help="Columns, by names or numbers: time=COLUMN[:ms] or time=100Hz, taxels=PATTERN, as "
-            "F{axis}{taxel} or 2..16; module=, episode=, label=; missing=, wrap=, decimal=.",
+            help="Columns, by names or numbers: time=COLUMN[:ms] or time=100Hz, taxels=FIRST..LAST,"
+            " such as 2..16; module=, episode=, label=; missing=, wrap=, decimal=.",
             show_default="as the header says",
         ),
     ] = None

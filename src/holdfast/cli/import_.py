@@ -92,7 +92,7 @@ def import_(
       holdfast import log.csv real/ --format xela-log --no-labels
       holdfast import press.csv real/ --sensor sensor.json
       holdfast import press.csv real/ --sensor anyskin \
-        --columns 'time=t:ms,taxels=m{taxel}{axis}'
+        --columns time=t:ms,taxels=2..16
       holdfast import cut.mcap recovered/
     """
     from holdfast.import_tasks import import_all

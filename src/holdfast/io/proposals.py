@@ -8,7 +8,6 @@ from typing import Any
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 
@@ -81,28 +80,20 @@ class Proposal(msgspec.Struct, frozen=True):
             commands: words of the commands that import with its options.
         """
         width = max(len(choice.what) for choice in self.choices)
-        left = max(len(choice.value) for choice in self.choices)
+        left = min(max(len(choice.value) for choice in self.choices), 40)
+        is_said = all(choice.is_said for choice in self.choices)
+        accept = "" if self.findings else "; --accept takes it as it is"
         lines = [
-            f"{self.path} does not say its whole layout; it has"
-            if any(not choice.is_said for choice in self.choices)
-            else f"{self.path} cannot be imported as it is; it has",
+            f"{self.path} {'cannot be imported so' if is_said else 'does not say its layout'}; it has",
             *(f"  {line}" for line in self.found),
-            *(
-                part
-                for text in self.findings
-                for part in textwrap.wrap(text, MAX_WIDTH, subsequent_indent="  ")
-            ),
+            *textwrap.wrap("; ".join(self.findings), MAX_WIDTH, subsequent_indent="  "),
             "what it may be, and what speaks for it:",
-            *(
-                f"  {choice.what:<{width}}  {choice.value:<{min(left, 40)}}  {choice.reason}".rstrip()
-                for choice in self.choices
-            ),
-            "paste this if it is right (docs/importing.md has the options"
-            + (")" if self.findings else "; --accept takes it as it is)")
-            + ":",
+            *(f"  {c.what:<{width}}  {c.value:<{left}}  {c.reason}" for c in self.choices),
+            f"paste this if it is right (docs/importing.md has the options{accept}):",
         ]
+        is_long = [len(line) > MAX_WIDTH for line in lines]
         lines = [
-            line if len(line) <= MAX_WIDTH else line[: MAX_WIDTH - 3] + "..." for line in lines
+            f"{line[:97]}..." if long else line for line, long in zip(lines, is_long, strict=True)
         ]
         return "\n".join([*lines, *(f"  {line}" for line in _wrapped(commands))])
 
@@ -154,38 +145,29 @@ def found_lines(arrays: Mapping[str, Any]) -> list[str]:
     Args:
         arrays: `StoredArray` by name.
     """
-    alike: dict[tuple[str, object], list[str]] = {}
+    alike: dict[tuple[str, tuple[int, ...]], list[str]] = {}
     for name, array in arrays.items():
-        alike.setdefault(
-            (re.sub(r"\d+|(?<![a-z])[xyz](?![a-z])", "#", name, flags=re.I), array.shape), []
-        ).append(name)
+        kind = re.sub(r"\d+|(?<![a-z])[xyz](?![a-z])", "#", name, flags=re.IGNORECASE)
+        alike.setdefault((kind, array.shape), []).append(name)
     lines = []
     for (_, shape), names in alike.items():
         title = names[0] if len(names) == 1 else f"{names[0]} ... {names[-1]} ({len(names)})"
         size = "" if len(shape) == 1 else f"  {shape}"
-        lines.append(
-            f"{title[-60:]}{size}  {_values_text(arrays[name] for name in names)}".rstrip()
-        )
+        lines.append(f"{title[-60:]}{size}  {_values_text([arrays[name] for name in names])}")
     more = len(lines) - MAX_FOUND
     return lines if more <= 0 else [*lines[:MAX_FOUND], f"and {more} more"]
 
 
-def _values_text(arrays: Any) -> str:  # noqa: ANN401
+def _values_text(arrays: Sequence[Any]) -> str:
     """Return the first values of arrays of one kind, and their range."""
-    parts: list[npt.NDArray[Any]] = []
-    for array in arrays:
-        try:
-            parts.append(np.asarray(array.read()).ravel())
-        except RecordingError:
-            return ""
-    if not len(parts[0]) or parts[0].dtype.kind not in "biuf":
-        return ", ".join(map(str, parts[0][:2])) if len(parts) == 1 else ""
-    first = ", ".join(_number_text(value) for value in parts[0][:3].tolist())
-    finite = [part[np.isfinite(part)] for part in parts]
-    low = min((part.min() for part in finite if len(part)), default=np.nan)
-    high = max((part.max() for part in finite if len(part)), default=np.nan)
-    return f"{first}, ...; {_number_text(low)} to {_number_text(high)}"
-
-
-def _number_text(value: float) -> str:
-    return f"{value:.13g}" if abs(value) > MAX_SHORT else f"{value:.6g}"
+    try:
+        parts = [np.ravel(array.read()) for array in arrays]
+    except RecordingError:  # a cell is no number, or a link is refused
+        return ""
+    if parts[0].dtype.kind not in "biuf":
+        return ", ".join(map(str, parts[0][:2]))
+    finite = np.concatenate([part[np.isfinite(part)] for part in parts])
+    ends = (finite.min(), finite.max()) if len(finite) else (np.nan, np.nan)
+    # Times of a clock are shown with all digits.
+    texts = [f"{v:.{6 if abs(v) < MAX_SHORT else 13}g}" for v in (*parts[0][:3].tolist(), *ends)]
+    return f"{', '.join(texts[:-2])}, ...; {' to '.join(texts[-2:])}"

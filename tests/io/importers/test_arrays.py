@@ -9,11 +9,11 @@ import pytest
 
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
+from holdfast.io.importers.arrays import arrays_of_hdf5
+from holdfast.io.importers.columns import Columns
 from holdfast.io.importers.reading import Source, recordings_of
 from holdfast.io.importers.stored import StoredArray, in_memory
 from holdfast.io.proposals import ProposalError
-from holdfast.io.importers.arrays import arrays_of_hdf5
-from holdfast.io.importers.columns import Columns
 from holdfast.sensors import sensor
 
 SKIN = sensor("anyskin")
@@ -102,7 +102,7 @@ ONE = {
     "samples, taxels, axes": lambda p: npz(p, tactile=READINGS, t=TIMES),
     "samples, numbers": lambda p: npz(p, tactile=FLAT, t=TIMES),
     "numbers, samples": lambda p: npz(p, tactile=FLAT.T, time=TIMES),
-    "samples, axes, taxels, ms": lambda p: npz(p, m=READINGS.swapaxes(1, 2), time_ms=1e3 * TIMES),
+    "ms": lambda p: npz(p, m=READINGS, time_ms=1e3 * TIMES),
     "taxels, axes, samples, ns": lambda p: npz(
         p, m=READINGS.transpose(1, 2, 0), stamps_ns=(1e9 * TIMES).astype(int) + 10**18
     ),
@@ -110,7 +110,6 @@ ONE = {
         p, tactile=READINGS, wrench=np.zeros((N, 6)), q=np.zeros((N, 7)), t=TIMES[:, None]
     ),
     "a rate": lambda p: npz(p, tactile=READINGS, fs=100),
-    "npy with the time first": lambda p: npy(p, np.column_stack([TIMES, FLAT])),
     "npy of fields": lambda p: npy(p, FIELDS),
     "MATLAB 5": lambda p: mat(p, data={"F": READINGS, "t": TIMES}),
     "MATLAB 5, columns": lambda p: mat(p, F=FLAT.T, t=TIMES[:, None]),
@@ -171,7 +170,7 @@ def check(found, expected):
 
 
 AT_ONCE = {
-    "samples, taxels, axes", "taxels, axes, samples, ns", "beside other arrays", "a rate",
+    "samples, taxels, axes", "taxels, axes, samples, ns", "beside other arrays", "a rate", "ms",
     "npy of fields", "MATLAB 7.3, axes", "HDF5", "HDF5, time above", "HDF5, rate", "HDF5 of fields",
     "MATLAB 5", "Parquet of nested lists", "Parquet of columns", "lines of numbers", "a document",
 }  # fmt: skip
@@ -250,8 +249,10 @@ REFUSED = {
     "another sensor": (lambda p: npz(p, F=READINGS[:, :4], t=TIMES), ("F",), "(120, 4, 3)"),
     "windows": (lambda p: npz(p, F=READINGS.reshape(12, 10, 5, 3), t=TIMES[:12]), ("F",),
                 "numpy.reshape"),
-    "axis, taxel": (lambda p: npz(p, F=READINGS.swapaxes(1, 2)[:, :, None], t=TIMES), ("F",),
-                    "(120, 3, 1, 5)"),
+    "axis, taxel": (lambda p: npz(p, F=READINGS.swapaxes(1, 2), t=TIMES), ("F",),
+                    "numpy.swapaxes"),
+    "the time first": (lambda p: npy(p, np.column_stack([TIMES, FLAT])), ("*",),
+                       "time=1,taxels=2..16"),
     "normal force": (lambda p: npz(p, F=READINGS[..., 2], t=TIMES), ("F",), "three axes"),
     "shear": (lambda p: npz(p, F=READINGS[..., :2], t=TIMES), ("*",), "three axes"),
     "no reading": (lambda p: npz(p, torque=READINGS, t=TIMES), ("*",), "torque is a torque"),

@@ -8,7 +8,7 @@ from holdfast.sensors import flat_sensor, sensor
 
 
 def test_a_layout_is_read_back_from_its_text():
-    text = "time=stamp:ms,taxels={module}_{axis}{taxel},module=id,missing=65535,wrap=65536"
+    text = "time=stamp:ms,taxels=a..c,module=id,missing=65535,wrap=65536"
     columns = Columns.parse(text, "4,5,-1", "mN")
     assert (columns.time_unit, columns.axes, columns.unit) == ("ms", (4, 5, -1), "mN")
     assert Columns.parse(str(columns), "4,5,-1", "mN") == columns
@@ -24,6 +24,7 @@ BAD = [
     *(((text,), "--columns: time=COLUMN") for text in ("time", "time=", "when=t", "x=y=z")),
     (("time=a,time=b",), "'time=b' given"),
     (("missing=two",), "missing=NUMBER"),
+    (("taxels=F{axis}{taxel}",), "taxels=FIRST..LAST"),
     (("decimal=;",), "decimal=comma or point"),
     *((("time=t", axes), "--axes: the numbers") for axes in ("1,2", "1,1,3", "0,1,2", "x,y,z")),
     (("time=t", None, "kg"), "'kg' given"),

@@ -1,7 +1,5 @@
 """Names that say finger, taxel and axis, and those that say something else."""
 
-import re
-
 import hypothesis.strategies as st
 import pytest
 from hypothesis import given
@@ -11,7 +9,6 @@ from holdfast.io.importers.names import (
     are_fingers,
     module_names,
     named_groups,
-    pattern_layout,
     run_of,
 )
 
@@ -87,19 +84,6 @@ def test_a_column_that_is_missing_is_named():
 def test_one_taxel_in_two_columns():
     with pytest.raises(RecordingError, match="'t1_x' and 't01_x'"):
         named_groups(("t1_x", "t01_x", "t1_y", "t1_z"), {1})
-
-
-@pytest.mark.parametrize(
-    ("taxels", "text"),
-    [
-        ("F{taxel}", "F{taxel}: {axis}"),
-        ("G{axis}", "'G{axis}'"),
-        ("F{axis}", "x and y alone given"),
-    ],
-)
-def test_patterns_that_no_column_fits(taxels, text):
-    with pytest.raises(RecordingError, match=re.escape(text)):
-        pattern_layout(taxels, ("t", "Fx", "Fy"))
 
 
 @pytest.mark.parametrize(("text", "message"), [("a..e", "no column 'e'"), ("c..a", "0 columns")])

@@ -85,7 +85,7 @@ def imported(path, keys, **words):
 
 TOPICS = {
     "numbers": (lambda bag, k: numbers(bag, READINGS[k]), "/skin"),
-    "numbers with sizes": (lambda bag, k: numbers(bag, READINGS[k].T, (3, 5)), "/skin"),
+    "numbers with sizes": (lambda bag, k: numbers(bag, READINGS[k], (5, 3)), "/skin"),
     "any topic": (lambda bag, k: numbers(bag, READINGS[k]), "*"),
     "points": (points, "/skin"),
     "taxels": (taxels, "/skin.taxels.f"),

@@ -180,12 +180,7 @@ def _format_of(
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
         raise RecordingError(f"{path} does not exist; a file or folder to import expected")
-    if path.is_dir() and any((path / mark).is_file() for mark in ZARR_MARKS):
-        raise RecordingError(
-            f"{path} is a zarr folder, which is not read: write its arrays in Python, as numpy.savez("
-            f"{path.stem + '.npz'!r}, tactile=zarr.open({str(path)!r})['data/tactile'][:], time=...), "
-            f"then import {path.stem}.npz"
-        )
+    _refuse_missing(path)
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
@@ -205,21 +200,26 @@ def _format_of(
         for known, source in loaded.items():
             if source is not None and takes_sensors(known) and source.can_read(path):
                 return known
-        _refuse_missing(path)
         return "csv"
 
 
 def _refuse_missing(path: Path) -> None:
-    """Refuse a file whose format needs a package that is not installed.
+    """Refuse a file whose format needs a package that is not installed, or another program.
 
     Raises:
         HoldfastError: it is such a file.
     """
     name = "rosbag" if path.suffix in BAG_SUFFIXES or (path / "metadata.yaml").is_file() else ""
     name = "lerobot" if (path / "meta" / "info.json").is_file() else name
-    if name and (missing := missing_part("importers", name, f"the format {name}")):
-        if name not in IMPORTER_PLUGINS.names():
-            raise missing
+    missing = missing_part("importers", name, f"the format {name}")
+    if missing and name not in IMPORTER_PLUGINS.names():
+        raise missing
+    if any((path / mark).is_file() for mark in ZARR_MARKS):
+        values = f"zarr.open({str(path)!r})['data/tactile'][:]"
+        raise RecordingError(
+            f"{path} is a zarr folder, which is not read: write its arrays in Python, as "
+            f"numpy.savez({path.stem + '.npz'!r}, tactile={values}, time=...), then import that"
+        )
 
 
 def takes_sensors(name: str) -> bool:
@@ -261,7 +261,6 @@ def _detected_format(path: Path) -> str:
         source = importer(name) if name in FORMATS else IMPORTER_PLUGINS.load(name)
         if source is not None and source.can_read(path):
             return name
-    _refuse_missing(path)
     names = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     raise RecordingError(
         f"{path} is of no supported format; there are {names} "

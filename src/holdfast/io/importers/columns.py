@@ -1,7 +1,7 @@
 """The layout of numbers in a file: time, unit, recordings, fingers, taxels and axes.
 
 It is the same for tables, arrays and bags. Its text is that of `--columns`, such as
-`time=stamp:ms,taxels=F{axis}{taxel}`; `--axes` and `--unit` stand beside it.
+`time=stamp:ms,taxels=2..16`; `--axes` and `--unit` stand beside it.
 """
 
 import re
@@ -38,9 +38,8 @@ class Columns:
     Attributes:
         time: column or array of the times, or a rate such as `100Hz` if there is none.
         time_unit: key of `TIME_UNITS`.
-        taxels: names of the taxel columns with `{taxel}`, `{axis}` and `{module}` in place of
-            what differs; or FIRST..LAST, consecutive columns of taxel after taxel, of module after
-            module. A column can also be given by its number, from 1.
+        taxels: FIRST..LAST, consecutive columns of taxel after taxel, of module after module, by
+            names or by numbers from 1.
         axes: which numbers of the group of a taxel are x, y and z, from 1; a negative number turns
             the sign. The group is the last axis of an array, or the columns of a taxel.
         unit: of the readings, one of `READING_UNITS`.
@@ -75,7 +74,7 @@ class Columns:
             ValueError: a part has another form, or its field or unit is unknown.
 
         Example:
-            >>> Columns.parse("time=stamp:ms,taxels=F{axis}{taxel}", "2,3,-1").axes
+            >>> Columns.parse("time=stamp:ms,taxels=2..16", "2,3,-1").axes
             (2, 3, -1)
         """
         fields: dict[str, str] = {}
@@ -91,6 +90,11 @@ class Columns:
             value = fields.get(field, NOT_CHECKED)
             if value != NOT_CHECKED and not re.fullmatch(r"-?\d+(\.\d*)?(e\d+)?", value):
                 raise ValueError(f"--columns: {field}=NUMBER or none expected, {value!r} given")
+        if RUN not in fields.get("taxels", RUN):
+            raise ValueError(
+                f"--columns: taxels=FIRST{RUN}LAST expected, {fields['taxels']!r} given; names as "
+                "Fx1 need no option"
+            )
         if fields.get("decimal", "comma") not in ("comma", "point"):
             raise ValueError(
                 f"--columns: decimal=comma or point expected, {fields['decimal']!r} given"
@@ -100,9 +104,8 @@ class Columns:
             raise ValueError(
                 f"--axes: the numbers of x, y and z from 1 expected, such as 2,3,-4, {axes!r} given"
             )
-        if unit is not None and unit not in (
-            names := [n for of in READING_UNITS.values() for n in of]
-        ):
+        names = [name for units in READING_UNITS.values() for name in units]
+        if unit not in (None, *names):
             raise ValueError(f"--unit: {', '.join(names)} expected, {unit!r} given")
         time, colon, time_unit = fields.get("time", "").rpartition(":")
         more = {"time": time, "time_unit": time_unit} if colon and time_unit in TIME_UNITS else {}

@@ -6,7 +6,7 @@ from itertools import takewhile
 from typing import NamedTuple
 
 from holdfast.errors import RecordingError
-from holdfast.io.importers.columns import RUN, THREE_AXES, named_column
+from holdfast.io.importers.columns import RUN, named_column
 from holdfast.io.importers.table import some_names
 from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number
 
@@ -54,12 +54,6 @@ _FORMS = (
 )
 _ONE_TAXEL = len(_FORMS) - 1
 _WORDS = re.compile(r"[a-z]+", re.IGNORECASE)
-_PLACEHOLDERS = {
-    "{module}": r"(?P<module>.+?)",
-    "{taxel}": r"(?P<taxel>\d+)",
-    "{axis}": r"(?P<axis>[xyzXYZ])",
-}
-
 Cells = Mapping[tuple[int, str], str]
 """Column by taxel (from 1) and axis."""
 
@@ -133,7 +127,7 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
                 other = found.setdefault(group, {}).setdefault((taxel, parts["axis"].lower()), name)
                 if other != name:
                     doubled[group] = other, name
-    groups = {}
+    groups: dict[Group, Cells] = {}
     for group, cells in found.items():
         numbers = sorted({taxel for taxel, _ in cells})
         whole = [(taxel, axis) for taxel in numbers for axis in "xyz"]
@@ -191,35 +185,6 @@ def are_fingers(names: Iterable[str]) -> bool:
     return alike or all(map(FINGER.fullmatch, names))
 
 
-def pattern_layout(pattern: str, names: Sequence[str]) -> dict[str, Cells]:
-    """Return the columns whose names fit a pattern, by module; taxels are counted from 1.
-
-    Raises:
-        RecordingError: no column fits, or not all axes have one.
-
-    Example:
-        >>> pattern_layout("{module}_{axis}{taxel}", ("t", "a_x0", "a_y0", "a_z0"))
-        {'a': {(1, 'x'): 'a_x0', (1, 'y'): 'a_y0', (1, 'z'): 'a_z0'}}
-    """
-    if "{axis}" not in pattern:
-        raise RecordingError(f"taxels={pattern}: {{axis}}, or FIRST{RUN}LAST, expected in it")
-    expression = re.escape(pattern)
-    for placeholder, group in _PLACEHOLDERS.items():
-        expression = expression.replace(re.escape(placeholder), group, 1)
-    found: dict[str, dict[tuple[int, str], str]] = {}
-    for name in names:
-        if match := re.fullmatch(expression, name):
-            words = match.groupdict()
-            key = (int(words.get("taxel", str(FIRST_TAXEL))), words["axis"].lower())
-            found.setdefault(words.get("module", ""), {})[key] = name
-    if not found:
-        raise RecordingError(f"no column is named as {pattern!r}; it has {some_names(names)}")
-    axes = sorted({axis for cells in found.values() for _, axis in cells})
-    if len(axes) < len("xyz"):
-        raise RecordingError(f"{' and '.join(axes)} alone given, as {pattern!r}; {THREE_AXES}")
-    return {module: _from_one(cells) for module, cells in found.items()}
-
-
 def run_of(text: str, names: Sequence[str]) -> list[str]:
     """Return the consecutive columns of FIRST..LAST.
 
@@ -233,11 +198,6 @@ def run_of(text: str, names: Sequence[str]) -> list[str]:
     if not run:
         raise RecordingError(f"taxels={text}: 0 columns given; 3 for each taxel expected")
     return run
-
-
-def _from_one(cells: Cells) -> Cells:
-    first = min(taxel for taxel, _ in cells)
-    return {(taxel_number(taxel - first), axis): name for (taxel, axis), name in cells.items()}
 
 
 def _common(lists: Sequence[Sequence[str]]) -> list[str]:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
+from holdfast.io.importers import times as of_times
 from holdfast.io.importers.columns import THREE_AXES, Columns, named_column, unit_factor
 from holdfast.io.importers.layout_findings import layout_findings, mended
 from holdfast.io.importers.names import EPISODE_OF_ROWS, MODULE_OF_ROWS
@@ -26,19 +27,6 @@ from holdfast.io.importers.table import (
     natural_order,
     some_names,
     with_integer_type,
-)
-from holdfast.io.importers.times import (
-    MAX_STEPS_BACK,
-    MIN_EPISODE,
-    TIME_UNITS,
-    check_steps,
-    clock_seconds,
-    increasing,
-    restarts,
-    smoothest,
-    time_names,
-    times_of,
-    true_rate,
 )
 from holdfast.io.importers.tracks import (
     ANY_MODULE,
@@ -76,7 +64,7 @@ def recordings_of(
     Args:
         source: the file; its stem is the name of the recordings.
         sensors: sensor by module, or by the path of an array, or of `"*"`. A path may lack its
-            first groups or its last name, and may have `*`; `a+b` lays two arrays beside each other.
+            first groups or its last name, and may have `*`; `a+b` lays two arrays together.
         columns: what the user says of the layout.
         report: receives what was read, and what not.
         accept: take what is proposed.
@@ -161,9 +149,9 @@ class _Reader:
                     module, own = row_module or name or DEFAULT_MODULE, readings[rows, k]
                     self._raw.append((module, track, own))
                     part = mended(own.copy(), self._columns.missing, self._columns.wrap)
-                    is_sample = np.full(len(rows), True)
-                    if self._columns.missing is not None:  # a sample without a reading is none
-                        is_sample = np.isfinite(part).any(axis=(1, 2))
+                    is_sample = np.isfinite(part).any(axis=(1, 2))
+                    # A sample without a reading is none, if a number stands for it.
+                    is_sample |= self._columns.missing is None
                     numbers = with_integer_type(factor * part[is_sample])
                     tactile = Tactile(track.skin, times[rows][is_sample], numbers, kept)  # type: ignore[arg-type]
                     labels = self._labels(track, module, rows[is_sample], tactile)
@@ -209,7 +197,9 @@ class _Reader:
         kinds = sorted(set(cells), key=lambda text: natural_order(Path(text)))
         n_changes = sum(a != b for a, b in itertools.pairwise(cells))
         takes_turns = 1 < len(kinds) <= MAX_FINGERS and n_changes > len(cells) / 4
-        is_run = n_changes == len(kinds) - 1 > 0 and min(Counter(cells).values()) >= MIN_EPISODE
+        is_run = (
+            n_changes == len(kinds) - 1 > 0 and min(Counter(cells).values()) >= of_times.MIN_EPISODE
+        )
         if not given and not (takes_turns if kind == "module" else is_run):
             return {}
         self.layout.used.add(name)
@@ -225,10 +215,10 @@ class _Reader:
     def _episodes(self, track: Track, times: Array, first: Rows) -> dict[str, Rows]:
         """Return the rows of each recording: by a column, or from a restart of the times."""
         rows = np.arange(len(times))
-        starts = restarts(times[first])
-        if self._columns.episode or starts:
-            if by_column := self._rows_by("episode", track):
-                return by_column
+        starts = of_times.restarts(times[first])
+        by_column = self._rows_by("episode", track) if self._columns.episode or starts else {}
+        if by_column:
+            return by_column
         at = [0, *(int(first[k]) for k in starts), len(rows)]
         parts = enumerate(itertools.pairwise(at), start=1)
         return {str(k): rows[a:b] for k, (a, b) in parts} if starts else {"": rows}
@@ -241,24 +231,26 @@ class _Reader:
         array = track.beside[name]
         values = array.read().reshape(-1)
         if array.kind == "U":
-            clock = clock_seconds(values.tolist())
+            clock = of_times.clock_seconds(values.tolist())
             if clock is None:
                 raise RecordingError(f"column {name!r}: a time expected, {values[0][:40]!r} given")
             return clock
         values = values.astype(np.float64)
         if self.layout.source.stated and self._columns.time is None:  # holdfast's own CSV
             return values
-        found = times_of(name, values[first], self._columns.time_unit, track.skin.rate)
+        found = of_times.times_of(name, values[first], self._columns.time_unit, track.skin.rate)
         if found.reason:
             self._set_time(f"{name}:{found.unit}", found.reason, time=name, time_unit=found.unit)
-        times: Array = values * TIME_UNITS[found.unit]
-        problem = "" if restarts(times[first]) else check_steps(name, times[first])
-        if not problem or np.mean(~increasing(times[first])) <= MAX_STEPS_BACK:
+        times: Array = values * of_times.TIME_UNITS[found.unit]
+        problem = (
+            "" if of_times.restarts(times[first]) else of_times.check_steps(name, times[first])
+        )
+        if not problem or np.mean(~of_times.increasing(times[first])) <= of_times.MAX_STEPS_BACK:
             return times
-        rate = true_rate(times[first])
+        rate = of_times.true_rate(times[first])
         if rate is None:
             raise RecordingError(
-                f"{problem}: their last digits are lost; strictly increasing times expected: give "
+                f"{problem}: their last digits are lost; increasing times expected: give "
                 "--columns time=100Hz with the true rate if the samples are evenly spaced"
             )
         self._set_time(f"{rate:g}Hz", problem, time=f"{rate:g}Hz", time_unit=None)
@@ -279,7 +271,7 @@ class _Reader:
         if text is not None:
             choose("time", str(self._columns).partition(",")[0][5:], "as given", is_said=True)
             return self._column(track, text)
-        names = time_names([name for name in track.beside if name not in track.used])
+        names = of_times.time_names([name for name in track.beside if name not in track.used])
         if not names and (rate := rate_beside(self.layout, track)):
             self.layout.columns = replace(self._columns, time=rate)
             choose("time", rate, "a number beside the array", is_said=True)
@@ -294,7 +286,7 @@ class _Reader:
             for name in names
             if track.beside[name].kind in "biuf"
         }
-        best = smoothest(numbers) if names[0] in numbers else names[0]
+        best = of_times.smoothest(numbers) if names[0] in numbers else names[0]
         why = "by its name" if best == names[0] else f"its steps vary less than those of {names[0]}"
         choose("time", best, why, is_said=True)
         self.layout.used.add(best)
@@ -302,7 +294,7 @@ class _Reader:
 
     def _in_order(self, times: Array) -> npt.NDArray[np.bool_]:
         """Return which samples have a stamp after all before; a few may step back."""
-        kept = increasing(times) | ~np.isfinite(times)
+        kept = of_times.increasing(times) | ~np.isfinite(times)
         if n := int(np.count_nonzero(~kept)):
             first = int(np.flatnonzero(~kept)[0]) + 1
             self.notes.append(
@@ -357,7 +349,7 @@ class _Reader:
                     continue
                 if what == "axes":
                     raise RecordingError(
-                        f"{module}: {finding.text}; {THREE_AXES}; --axes 1,2,3 takes them as they are"
+                        f"{module}: {finding.text}; {THREE_AXES}; --axes 1,2,3 takes them so"
                     )
                 self.layout.columns = replace(self._columns, **{what: value})  # type: ignore[arg-type]
                 self.layout.choose(what, value, "as said above")
@@ -423,4 +415,4 @@ def _check_overlap(modules: Mapping[str, Tactile]) -> None:
 def _texts(array: StoredArray) -> list[str]:
     """Return the cells of a column as text."""
     values = array.read().reshape(-1).tolist()
-    return [x if isinstance(x, str) else "" if x != x else f"{x:g}" for x in values]
+    return [x if isinstance(x, str) else "" if np.isnan(x) else f"{x:g}" for x in values]

@@ -79,10 +79,10 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
     elif isinstance(value, Mapping):
         sizes = np.ravel(value["shape"]) if np.ndim(value.get("shape", 0)) == 1 else ()
         for key, one in value.items():
-            if len(sizes) and np.ndim(one) == 1 and np.size(one) == np.prod(sizes) > len(sizes):
-                one = np.reshape(one, [int(size) for size in sizes])
+            is_shaped = len(sizes) and np.ndim(one) == 1 and np.size(one) == np.prod(sizes)
+            part = np.reshape(one, [int(n) for n in sizes]) if is_shaped and key != "shape" else one
             if key != "shape" or not len(sizes):
-                yield from _leaves(one, f"{path}/{key}" if path else str(key))
+                yield from _leaves(part, f"{path}/{key}" if path else str(key))
     elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
         rows = [dict(_leaves(one, "")) for one in value]
         ids = [[row.get(name) for row in rows] for name in ID_NAMES]

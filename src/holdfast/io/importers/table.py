@@ -248,11 +248,10 @@ def _numbers(
 ) -> list[float]:
     """Return the numbers of a row; NaN for empty cells and text, which is appended to `cells`.
 
-    Args:
-        wrong: receives the first wrong cell of each column; None to raise an error for it.
+    The first wrong cell of each column goes to `wrong`; without it, it is an error.
 
     Raises:
-        RecordingError: the row has another length, or a cell that is not a number.
+        RecordingError: a cell is not a number.
         UnicodeError: a cell of text is not UTF-8.
     """
     for index, column in cells.items():
@@ -408,14 +407,13 @@ def read_head(path: Path) -> TableHead:
                 elif number == 1 and (given := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))):
                     separators = given["separator"]
                 elif line.strip():
-                    following = file.readline(MAX_HEAD_SIZE)
-                    names, separator = _names(line.rstrip("\r\n"), following, separators)
-                    if n_skipped := _rows_before(names, separator, following, file, separators):
-                        return _head_after(path, encoding, number + n_skipped, separators, comments)
-                    if not _is_sample(names, separator):
-                        row = _cells(following, separator)
+                    lines = [line, file.readline(MAX_HEAD_SIZE)]
+                    names, separator, n = _header(lines, file, separators)
+                    if n or not _is_sample(names, separator):
+                        row, first = _cells(lines[n + 1], separator), number + n + 1
+                        n_skipped = first - 2 if n else 0
                         return TableHead(
-                            tuple(comments), names, number + 1, separator, encoding, True, row
+                            tuple(comments), names, first, separator, encoding, True, row, n_skipped
                         )
                     numbered = tuple(f"column{k + 1}" for k in range(len(names)))
                     title = _cells(comments[-1], separator) if comments else ()
@@ -433,34 +431,25 @@ def read_head(path: Path) -> TableHead:
     raise RecordingError(f"{path} is empty; a header line and samples expected")
 
 
-def _rows_before(
-    names: Sequence[str], separator: str, following: str, file: TextIO, separators: str
-) -> int:
-    """Return the number of lines before the header of the table; 0 if the first line is it.
+def _header(lines: list[str], file: TextIO, separators: str) -> tuple[tuple[str, ...], str, int]:
+    """Return the names in the header, the separator, and the index of the header among the lines.
 
-    A block of a few cells a line, such as a description of the session, may precede it.
+    A block of lines of a few cells, such as a description of the session, may precede it.
+
+    Args:
+        lines: the first two; those that are read more are appended.
+        file: has the others.
+        separators: that may be between cells.
     """
-    if len(names) >= MIN_CELLS and len(_cells(following, separator)) == len(names):
-        return 0
-    lines = [following, *islice(iter(lambda: file.readline(MAX_HEAD_SIZE), ""), MAX_BLOCK)]
-    for n, (line, after) in enumerate(itertools.pairwise(lines), start=1):
-        if line.strip() and not line.startswith("#"):
+    names, separator = _names(lines[0].rstrip("\r\n"), lines[1], separators)
+    if len(names) < MIN_CELLS or len(_cells(lines[1], separator)) < len(names):
+        lines += islice(iter(lambda: file.readline(MAX_HEAD_SIZE), ""), MAX_BLOCK)
+        for n, (line, after) in enumerate(itertools.pairwise(lines)):
             titles, mark = _names(line.rstrip("\r\n"), after, separators)
-            n_after = len(_cells(after, mark))
-            if len(titles) == n_after >= MIN_CELLS and n_after > 2 * len(names):
-                return n
-    return 0
-
-
-def _head_after(
-    path: Path, encoding: str, number: int, separators: str, comments: Sequence[str]
-) -> TableHead:
-    """Return the head of a table whose header is a line after the first."""
-    with path.open(encoding=encoding, newline="") as file:
-        line, following = list(islice(file, number - 1, number + 1))
-    names, separator = _names(line.rstrip("\r\n"), following, separators)
-    row = _cells(following, separator)
-    return TableHead(tuple(comments), names, number + 1, separator, encoding, True, row, number - 1)
+            is_table = len(titles) == len(_cells(after, mark)) >= MIN_CELLS
+            if n and is_table and len(titles) > 2 * len(names):
+                return titles, mark, n
+    return names, separator, 0
 
 
 def columns_of_table(

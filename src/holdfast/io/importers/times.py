@@ -118,7 +118,7 @@ def times_of(name: str, values: Array, unit: str | None, nominal: float) -> Time
     low, high = POSSIBLE_RATES if stated else DOUBTFUL_RATES
     used = stated or "s"
     rate = 1 / (step * TIME_UNITS[used]) if step else 0.0
-    if not step or low <= rate * (1 + 1e-9) and rate <= high * (1 + 1e-9):
+    if not step or (low <= rate * (1 + 1e-9) and rate <= high * (1 + 1e-9)):
         return Times(values * TIME_UNITS[used], used)
     likely = min(TIME_UNITS, key=lambda u: abs(math.log(step * TIME_UNITS[u] * nominal)))
     its_rate = 1 / (step * TIME_UNITS[likely])

@@ -1,12 +1,13 @@
 """Which columns or arrays of a file are the taxels of which module, by names, shapes and options."""
 
+import glob
 import itertools
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
-from functools import partial
+from functools import cache, partial
 from math import prod
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,20 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
+from holdfast.io.importers import names as of_names
 from holdfast.io.importers.columns import READING_UNITS, RUN, THREE_AXES, Columns, named_column
-from holdfast.io.importers.names import (
-    POLAR,
-    Group,
-    are_fingers,
-    different_parts,
-    module_names,
-    named_groups,
-    pattern_layout,
-    quantity_of,
-    run_of,
-    split_unit,
-    words_of,
-)
 from holdfast.io.importers.stored import StoredArray, StoredArrays
 from holdfast.io.importers.table import first_texts, natural_order, some_names
 from holdfast.io.importers.times import time_names
@@ -167,7 +156,7 @@ def tracks_of(layout: Layout) -> list[Track]:
         return table_tracks(layout, layout.arrays, layout.arrays)
     if not layout.sensors:
         _propose_for_arrays(layout)
-    names = different_parts(list(layout.sensors)) if len(layout.sensors) > 1 else [""]
+    names = of_names.different_parts(list(layout.sensors)) if len(layout.sensors) > 1 else [""]
     finder = _ArrayFinder(layout)
     pairs = zip(layout.sensors.items(), names, strict=True)
     return [track for (key, skin), name in pairs for track in finder.tracks(key, skin, name)]
@@ -182,17 +171,12 @@ def table_tracks(layout: Layout, columns: StoredArrays, beside: StoredArrays) ->
     if text is None:
         free = [name for name in names if name not in words and not _LABEL.fullmatch(name)]
         modules = _named_modules(layout, free)
-    elif RUN in text:
-        modules = _consecutive_modules(layout, text, names)
     else:
-        found = pattern_layout(text, names)
-        modules = {
-            module: [cells[cell] for cell in sorted(cells)] for module, cells in found.items()
-        }
+        modules = _consecutive_modules(layout, text, names)
     tracks = []
     beside = {name: array for name, array in beside.items() if not _INDEX.fullmatch(name.strip())}
     for module, own in modules.items():
-        unit = split_unit(own[0])[1]
+        unit = of_names.split_unit(own[0])[1]
         skin = _sensor_of(layout, module, len(own) // 3, unit)
         size = len(own) // skin.n_taxels
         if len(own) != size * skin.n_taxels or size < len("xyz"):
@@ -216,7 +200,7 @@ def _stacked(
 
 def _consecutive_modules(layout: Layout, text: str, names: Sequence[str]) -> dict[str, list[str]]:
     """Return consecutive columns, of several modules if they are many."""
-    run = run_of(text, names)
+    run = of_names.run_of(text, names)
     size = 3 * max((one.n_taxels for one in layout.sensors.values()), default=len(run) // 3)
     if layout.columns.axes is None and len(run) % 3:
         raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
@@ -232,15 +216,17 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
         RecordingError: no names are those of taxels.
     """
     n_taxels = {one.n_taxels for one in layout.sensors.values()}
-    groups = named_groups(names, n_taxels)
+    groups = of_names.named_groups(names, n_taxels)
     if is_other := not groups and bool(n_taxels):
-        groups = named_groups(names, ())
+        groups = of_names.named_groups(names, ())
     units = {unit for of in READING_UNITS.values() for unit in of} | {None}
     has_imu = {"a", "g"} <= {word for group in groups for word in group.words}
     others = {}
     for group in groups:
         is_imu = has_imu and group.words <= {"a", "g"}
-        what = quantity_of(group.words) or ("accelerometer and gyroscope" if is_imu else None)
+        what = of_names.quantity_of(group.words) or (
+            "accelerometer and gyroscope" if is_imu else None
+        )
         if what or group.unit not in units:
             others[group] = what or f"in {group.unit}"
     groups = {group: cells for group, cells in groups.items() if group not in others}
@@ -248,12 +234,12 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
         raise _no_taxels(names, n_taxels, {group.head: what for group, what in others.items()})
     form = min(group.form for group in groups)
     groups = {group: cells for group, cells in groups.items() if group.form == form}
-    modules = module_names(list(groups))
+    modules = of_names.module_names(list(groups))
     is_own = all(re.fullmatch(r".+[._]t", group.head) for group in groups)
     columns = [[cells[cell] for cell in sorted(cells)] for cells in groups.values()]
     found = dict(zip(modules, columns, strict=True))
-    first: Group = next(iter(groups))
-    if len(groups) > 1 and not is_own and not are_fingers(modules):
+    first: of_names.Group = next(iter(groups))
+    if len(groups) > 1 and not is_own and not of_names.are_fingers(modules):
         first = next((group for group in groups if group.words & FORCE_WORDS), first)
         own = found.pop(modules[list(groups).index(first)])
         rest = first_texts([other[0] for other in found.values()])
@@ -277,28 +263,25 @@ def _no_taxels(
     names: Sequence[str], n_taxels: set[int], others: Mapping[str, str]
 ) -> RecordingError:
     """Return the reason for which no columns are taxels."""
-    if polar := sorted(POLAR.intersection(words_of(" ".join(names)))):
-        return RecordingError(
-            f"columns of size and {polar[0]} given, no x, y and z: write x = tangential * "
-            "cos(direction), y = tangential * sin(direction), z = normal to columns x0, y0, z0, "
-            "x1, ... in Python, and leave numbers such as 65535 empty"
-        )
-    if others:
-        listed = ", ".join(f"{head}... ({what})" for head, what in others.items())
-        more = "; the others have normal force alone" if len(names) > 6 * len(others) else ""
-        return RecordingError(f"no forces of taxels, but {listed} given{more}; {THREE_AXES}")
-    bare = [split_unit(name)[0] for name in names]
+    bare = [of_names.split_unit(name)[0] for name in names]
     axes = {name[-1].lower() for name in bare if re.search(r"\d[\W_]*[a-z]?[xyz]$", name, re.I)}
     many = max(Counter(re.sub(r"\d+", "0", name) for name in bare).values(), default=0)
-    is_few = many in {k * n for n in n_taxels for k in (1, 2) if n > 1}
-    if is_few or len(axes) in (1, 2) or sum(map(bool, map(_ONE_AXIS.fullmatch, bare))) > 3:
-        return RecordingError(f"columns {some_names(names)} given; {THREE_AXES}")
+    is_few = many in {k * n for n in n_taxels for k in (1, 2) if n > 1} or len(axes) in (1, 2)
     last = 3 * next(iter(n_taxels), 5) + 1
-    return RecordingError(
-        f"no columns are named as x, y and z of taxels: {some_names(names)} given; give --columns "
-        f"time=COLUMN,taxels=FIRST{RUN}LAST (or numbers, taxels=2{RUN}{last}; time=100Hz without "
-        "times) if consecutive columns are x, y, z of taxel after taxel"
+    what = f"columns {some_names(names)}"
+    advice = (
+        f"give --columns time=COLUMN,taxels=FIRST{RUN}LAST (or numbers, taxels=2{RUN}{last}; "
+        "time=100Hz without times) if consecutive columns are x, y, z of taxel after taxel"
     )
+    if of_names.POLAR & of_names.words_of(" ".join(names)):
+        advice = "of a size and a direction write x = size * cos(direction), y = size * "
+        advice += "sin(direction) and z to columns x0, y0, z0, x1, ..., without 65535 and the like"
+    elif others:
+        what += "".join(f", {head}... ({what})" for head, what in others.items())
+        advice = f"the others have normal force alone; {THREE_AXES}"
+    elif is_few or sum(map(bool, map(_ONE_AXIS.fullmatch, bare))) > len("xyz"):
+        advice = THREE_AXES
+    return RecordingError(f"no columns are named as x, y and z of taxels: {what} given; {advice}")
 
 
 def _sensor_of(layout: Layout, module: str, n_taxels: int, unit: str | None) -> Sensor:
@@ -346,13 +329,8 @@ def rate_beside(layout: Layout, track: Track) -> str | None:
         group, _, last = name.rpartition("/")
         is_near = not group or f"{track.used[0]}/".startswith(f"{group}/")
         is_rate = re.sub(r"[\W_]", "", last.lower()) in RATE_NAMES and array.kind in "iuf"
-        if (
-            is_near
-            and is_rate
-            and prod(array.shape) == 1
-            and (value := float(array.read().item())) > 0
-        ):
-            return f"{value:.10g}Hz"
+        if is_near and is_rate and prod(array.shape) == 1 and array.read().item() > 0:
+            return f"{array.read().item():.10g}Hz"
     return None
 
 
@@ -364,14 +342,12 @@ class _Axes(NamedTuple):
         n_samples: its size.
         n_modules: number of modules.
         is_episodes: whether the axis before counts recordings.
-        is_turned: whether the taxels are after x, y and z.
     """
 
     axis: int
     n_samples: int
     n_modules: int
     is_episodes: bool = False
-    is_turned: bool = False
 
 
 class _ArrayFinder:
@@ -384,9 +360,9 @@ class _ArrayFinder:
     def tracks(self, key: str, skin: Sensor, module: str) -> list[Track]:
         """Return the modules in the arrays that a key names."""
         option_key, key = key, key.strip("/")
-        parts = [self._named(part) for part in key.split("+")] if "+" in key else []
-        if parts and all(len(part) == 1 for part in parts):
-            return self._at([part[0] for part in parts], skin, module)
+        summands = [self._named(part) for part in key.split("+")]
+        if len(summands) > 1 and all(len(paths) == 1 for paths in summands):
+            return self._at([paths[0] for paths in summands], skin, module)
         named = self._named(key)
         if not named:
             raise RecordingError(f"no array {key!r}; it has {listed(self._arrays)}")
@@ -399,8 +375,7 @@ class _ArrayFinder:
         if not fitting and (tracks := self._of_columns(named, skin)):
             return tracks
         is_said = bool(fitting)
-        ways = (self._axes, self._group, self._is_timed)
-        fitting = fitting or [n for n in readings if any(way(n, skin) for way in ways)]
+        fitting = fitting or [n for n in readings if self._axes(n, skin) or self._group(n, skin)]
         if not fitting and len(readings) == 1:
             raise self._misfit(readings[0], skin)
         if not fitting:
@@ -409,16 +384,16 @@ class _ArrayFinder:
                 f"it has {listed(self._arrays)}; none has {skin.n_taxels} taxels x 3 axes a sample "
                 f"({skin.name}): give another sensor; {'; '.join([*others[:2], THREE_AXES])}"
             )
-        parts = different_parts(fitting, by_group=True)
+        parts = of_names.different_parts(fitting, by_group=True)
         names, ends = [module] * len(fitting), [f"-{part}" for part in parts]
         if len(fitting) == 1 or not all(map(_RECORDING.fullmatch, parts)):
             ends = [""] * len(fitting)
         if len(fitting) > 1 and not any(ends):
-            names = different_parts(fitting)
-            if are_fingers(names):
+            names = of_names.different_parts(fitting)
+            if of_names.are_fingers(names):
                 self._layout.choose("fingers", ", ".join(names), "by the names", is_said=True)
             else:
-                best = next((n for n in fitting if words_of(n) & FORCE_WORDS), fitting[0])
+                best = next((n for n in fitting if of_names.words_of(n) & FORCE_WORDS), fitting[0])
                 rest = first_texts([name for name in fitting if name != best])
                 self._layout.choose("array", best, f"by its name; {rest} would fit, too")
                 fitting, names, ends, is_said = [best], [module], [""], False
@@ -440,7 +415,7 @@ class _ArrayFinder:
     def _fits(self, name: str, skin: Sensor) -> bool:
         """Return whether an array has the taxels of a sensor by its last axes, or by names."""
         words = self._arrays[name].columns
-        is_named = bool(words) and bool(named_groups(words, {skin.n_taxels}))
+        is_named = bool(words) and bool(of_names.named_groups(words, {skin.n_taxels}))
         return is_named or self._axes(name, skin, is_exact=False) is not None
 
     def is_reading(self, name: str) -> bool:
@@ -450,10 +425,8 @@ class _ArrayFinder:
     def beside(self, name: str) -> dict[str, StoredArray]:
         """Return the arrays of single values beside an array: in its group, or one around it."""
         columns = self._layout.columns
-        given = {
-            (getattr(columns, key) or "").strip("/")
-            for key in ("time", "label", "cause", "module", "episode")
-        }
+        texts = (columns.time, columns.label, columns.cause, columns.module, columns.episode)
+        given = {text.strip("/") for text in texts if text}
         found: dict[str, str] = {}  # of one name, the nearest
         for other in sorted(self._arrays, key=len):
             shape, (group, _, last) = self._arrays[other].shape, other.rpartition("/")
@@ -463,22 +436,15 @@ class _ArrayFinder:
         return {last: self._arrays[other] for last, other in found.items()}
 
     def _quantity(self, name: str) -> str | None:
-        return quantity_of(words_of("/".join(name.split("/")[-2:])))
+        return of_names.quantity_of(of_names.words_of("/".join(name.split("/")[-2:])))
 
     def _named(self, key: str) -> list[str]:
         """Return the paths of the arrays that a key may mean: also those in a group of its name."""
         key = key.strip("/")
-        return (
-            [key]
-            if key in self._arrays
-            else [
-                name
-                for name in self._arrays
-                if fnmatchcase(name, key)
-                or f"/{name}".endswith(f"/{key}")
-                or name.startswith(f"{key}/")
-            ]
-        )
+        if key in self._arrays:
+            return [key]
+        forms = (key, f"*/{glob.escape(key)}", f"{glob.escape(key)}/*")
+        return [name for name in self._arrays if any(fnmatchcase(name, form) for form in forms)]
 
     def _times(self, name: str) -> StoredArray | None:
         """Return the times beside an array; None if there are none, or a rate."""
@@ -511,8 +477,6 @@ class _ArrayFinder:
                     size = 3 if self._layout.columns.axes is None else rest[-1] // n_taxels
                     n_modules = prod(rest) // max(n_taxels * size, 1)
                     fits = size > 0 and n_modules > 0 and rest[-1] % (n_taxels * size) == 0
-                if rest == (3, n_taxels) != (3, 3) and is_exact:
-                    return _Axes(axis, shape[axis], 1, is_episodes, is_turned=True)
                 if fits and (n_modules == 1 or not is_episodes):
                     return _Axes(axis, shape[axis], n_modules, is_episodes)
         return None
@@ -521,16 +485,8 @@ class _ArrayFinder:
         """Return how many numbers each taxel has in an array of more than three; 0 without."""
         array = self._arrays[name]
         inner = {prod(array.shape[k:-1]) for k in range(1, len(array.shape))}
-        is_wide = (
-            array.kind in "biuf" and skin.n_taxels in inner and 3 < array.shape[-1] <= MAX_GROUP
-        )
-        return array.shape[-1] if is_wide else 0
-
-    def _is_timed(self, name: str, skin: Sensor) -> bool:
-        """Return whether the first number of each sample of a flat array is its time."""
-        array, columns = self._arrays[name], self._layout.columns
-        is_wider = array.shape[1:] == (3 * skin.n_taxels + 1,) and array.kind in "iuf"
-        return is_wider and not columns.time and bool((np.diff(array.read()[:, 0]) > 0).all())
+        fits = array.kind in "biuf" and skin.n_taxels in inner
+        return array.shape[-1] if fits and 3 < array.shape[-1] <= MAX_GROUP else 0
 
     def _at(self, paths: Sequence[str], skin: Sensor, module: str, end: str = "") -> list[Track]:
         """Return the tracks of an array, or of arrays that are laid beside each other."""
@@ -541,24 +497,17 @@ class _ArrayFinder:
         if len(paths) == 1 and len(array.shape) == 2 and (layout.columns.taxels or array.columns):
             words = array.columns or tuple(f"column{k + 1}" for k in range(array.shape[1]))
             columns = {
-                word: StoredArray(array.shape[:1], array.kind, partial(_column, array, k))
+                word: StoredArray(array.shape[:1], array.kind, partial(_part, array, np.s_[:, k]))
                 for k, word in enumerate(words)
             }
             near = {n: one for n, one in beside.items() if prod(one.shape) == array.shape[0]}
             if tracks := self._of_table(columns, near | columns, skin):
                 layout.used.add(path)
-                return [
-                    one._replace(modules=tuple(m or module for m in one.modules)) for one in tracks
-                ]
+                return [t._replace(modules=tuple(m or module for m in t.modules)) for t in tracks]
         axes = [self._axes(one, skin) for one in paths]
         if len(paths) > 1:
             sizes = [self._arrays[one].shape[0] for one in paths]
             axes = [_Axes(0, n, 1) if len(set(sizes)) == 1 else None for n in sizes]
-        if axes[0] is None and self._is_timed(path, skin):
-            last = array.shape[1]
-            layout.columns = replace(layout.columns, time="1", taxels=f"2{RUN}{last}")
-            layout.choose("time", "1", "the first number of each sample grows")
-            return self._at(paths, skin, module, end)
         if axes[0] is None and self._group(path, skin):
             values = np.asarray(array.read(), dtype=np.float64).reshape(-1, array.shape[-1])
             numbers, reason = likely_axes(values)
@@ -581,21 +530,20 @@ class _ArrayFinder:
         layout.used.update(paths)
         names = [f"finger{k + 1}" for k in range(n)] if n > 1 else [""]
         modules = tuple("/".join(filter(None, (module, name))) for name in names)
-        reads = [_once(self._arrays[one].read) for one in paths]
+        reads = [cache(self._arrays[one].read) for one in paths]  # once for all recordings
         tracks = []
         for k in range(array.shape[0] if first.is_episodes else 1):
             part = (k,) if first.is_episodes else ()
-            at = first.axis - len(part)
             size = (first.n_samples, n, skin.n_taxels, -1)
-            values = partial(_arranged, reads, part, at, size, is_turned=first.is_turned)
+            read = partial(_arranged, reads, part, first.axis - len(part), size)
             near = {}
             for name, other in beside.items():
                 if part and other.shape[:2] == array.shape[:2]:
-                    near[name] = StoredArray(other.shape[1:2], other.kind, partial(_row, other, k))
+                    near[name] = StoredArray(other.shape[1:2], other.kind, partial(_part, other, k))
                 elif prod(other.shape) == first.n_samples:
                     near[name] = other
             number = f"-{k + 1}" if part else ""
-            tracks.append(Track(skin, modules, values, near, tuple(paths), None, f"{end}{number}"))
+            tracks.append(Track(skin, modules, read, near, tuple(paths), None, f"{end}{number}"))
         return tracks
 
     def _of_columns(self, named: Sequence[str], skin: Sensor) -> list[Track]:
@@ -605,12 +553,8 @@ class _ArrayFinder:
             shape, (group, _, last) = self._arrays[name].shape, name.rpartition("/")
             if prod(shape) == max(shape, default=0) > 1:
                 groups.setdefault(group, {})[last] = self._arrays[name]
-        found = (
-            self._of_table(columns, columns, skin)
-            for columns in groups.values()
-            if len(columns) > 3
-        )
-        return next(filter(None, found), [])
+        large = [columns for columns in groups.values() if len(columns) > len("xyz")]
+        return next(filter(None, (self._of_table(one, one, skin) for one in large)), [])
 
     def _of_table(self, columns: StoredArrays, beside: StoredArrays, skin: Sensor) -> list[Track]:
         """Return the tracks of columns as of a table; none without names of taxels."""
@@ -629,6 +573,8 @@ class _ArrayFinder:
         what = ": give another --sensor, or --axes for more numbers of a taxel"
         if shape[-2:] == (3, n):
             what = "; swap its last axes in Python: numpy.swapaxes(array, -1, -2)"
+        elif shape[1:] == (3 * n + 1,):
+            what = f"; give --columns time=1,taxels=2{RUN}{3 * n + 1} if the first is the time"
         elif n > 1 and shape[-1:] in ((1,), (2,), (n,), (2 * n,)):
             what = f"; {THREE_AXES}"
         return RecordingError(
@@ -637,18 +583,8 @@ class _ArrayFinder:
         )
 
 
-def _column(array: StoredArray, k: int) -> npt.NDArray[Any]:
-    return array.read()[:, k]
-
-
-def _row(array: StoredArray, k: int) -> npt.NDArray[Any]:
-    return array.read()[k].reshape(-1)
-
-
-def _once(read: Callable[[], npt.NDArray[Any]]) -> Callable[[], npt.NDArray[Any]]:
-    """Return a function that reads once, for all recordings of an array."""
-    kept: list[npt.NDArray[Any]] = []
-    return lambda: kept[0] if kept else kept.append(np.asarray(read())) or kept[0]
+def _part(array: StoredArray, index: Any) -> npt.NDArray[Any]:  # noqa: ANN401 (of an array)
+    return np.ravel(array.read()[index])
 
 
 def _arranged(
@@ -656,14 +592,10 @@ def _arranged(
     part: tuple[int, ...],
     axis: int,
     shape: tuple[int, ...],
-    *,
-    is_turned: bool,
 ) -> npt.NDArray[Any]:
     """Return (n, n_modules, n_taxels, numbers of a taxel) of arrays, beside each other."""
-    parts = [np.moveaxis(read()[part], axis, 0) for read in reads]
-    if is_turned:
-        parts = [values.swapaxes(-1, -2) for values in parts]
-    return np.concatenate([values.reshape(shape) for values in parts], axis=-1)
+    parts = [np.moveaxis(read()[part], axis, 0).reshape(shape) for read in reads]
+    return np.concatenate(parts, axis=-1)
 
 
 def likely_axes(values: npt.NDArray[Any]) -> tuple[tuple[int, int, int], str]:

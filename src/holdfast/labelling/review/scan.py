@@ -67,8 +67,8 @@ class ModuleScan:
             if not self._last.size:
                 readings = module.readings[:HELD_ROWS]
                 self.rows_per_update = held_rows(readings, module.sensor, module.rate) or 1.0
-                first = module.readings[:LAYOUT_SAMPLES]
-                self.layout = layout_findings(first, module.sensor, module.unit)
+                readings = module.readings[:LAYOUT_SAMPLES]
+                self.layout = layout_findings(readings, module.sensor, module.unit)
             self._times.append(module.times)
             self._end = float(module.times[-1])
         for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):
