@@ -4,7 +4,7 @@
     python tests/cases.py --holdfast PATH       # the same with the command of another installation
     python tests/cases.py 33 37                 # some cases, with all that they print
 
-The inputs are made by the scripts `case_NN.py` in the folder HOLDFAST_CASES, or in `../shared/cases`
+The inputs are made by the scripts `case_NN.py` in the folder HOLDFAST_CASES, or `shared/cases`
 beside the checkout; their docstrings say what must come out.
 """
 
@@ -123,7 +123,8 @@ TABLE = (
          [("finger1", 0.0, 2, "x", 0, 30)], ["wrap=65536"]),
     Case("33 --far", "--sensor anyskin", "proposes", F1, 1000, 100,
          [("finger1", 0.5, 1, "z", -200 / 0.15, 40), ("finger1", 5.0, 1, "z", 600 / 0.15, 40)]),
-    Case("34", "--topic /tactile_data=anyskin", modules=F1, n=500, rate=50, says=["the norm, not z"]),
+    Case("34", "--topic /tactile_data=anyskin", modules=F1, n=500, rate=50,
+         says=["the norm, not z"]),
     Case("35", "--sensor duo.json", "refuses", says=["accelerometer", "normal force alone"]),
     Case("35", "--sensor duo.json --columns time=1000Hz", "refuses", says=["accelerometer"]),
     Case("37", "--array tactile/left/data=duo.json --columns time=30Hz", "proposes",
@@ -280,10 +281,10 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as name:
             printed, wrong = outcome(case, Path(name), run)
         n_wrong += bool(wrong)
-        print(f"{'WRONG' if wrong else 'right'}  {case.id}", *wrong, sep="  |  ", flush=True)
+        print(f"{'WRONG' if wrong else 'right'}  {case.id}", *wrong, sep="  |  ", flush=True)  # noqa: T201
         if options.numbers:
-            print("\n".join(printed))
-    print(f"{len(cases) - n_wrong} of {len(cases)} cases are right")
+            print("\n".join(printed))  # noqa: T201
+    print(f"{len(cases) - n_wrong} of {len(cases)} cases are right")  # noqa: T201
 
 
 if __name__ == "__main__":

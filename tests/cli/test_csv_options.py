@@ -55,7 +55,7 @@ def run(capsys, *words, code=0):
 def test_detect_gives_what_it_gives_after_an_import(folder, sensor, capsys):
     write_press(folder / "press.csv")
     words = ("--sensor", sensor, "--columns", "time=timestamp:ms")
-    out, err = run(capsys, "detect", "builtin:any", "press.csv", *words)
+    out, _ = run(capsys, "detect", "builtin:any", "press.csv", *words)
     assert {path.name for path in folder.iterdir()} == {"press.csv", "sensor.json"}
     run(capsys, "import", "press.csv", "out", *words)
     assert run(capsys, "detect", "builtin:any", "out/press.parquet").out == out
@@ -65,7 +65,7 @@ def test_columns_are_named_and_any_suffix_is_read(folder, sensor, capsys):
     write_press(folder / "press.log", "m{taxel}{axis}")
     columns = "time=timestamp:ms,taxels=m0x..m8z"
     words = ("press.log", "--sensor", sensor, "--columns", columns, "--summary", "--json")
-    out, err = run(capsys, "detect", "builtin:any", *words)
+    out, _ = run(capsys, "detect", "builtin:any", *words)
     assert json.loads(out)["fingers"]["finger1"]["n_samples"] == N
 
 
@@ -74,7 +74,7 @@ def test_evaluate_takes_the_labels_of_a_column(folder, sensor, capsys):
     for name in ("a", "b"):
         write_press(folder / "in" / f"{name}.csv", labelled=True)
     words = ("--sensor", sensor, "--columns", "time=timestamp:ms", "--json")
-    out, err = run(capsys, "evaluate", "builtin:any", "in", *words)
+    out, _ = run(capsys, "evaluate", "builtin:any", "in", *words)
     report = json.loads(out)
     assert [recording["name"] for recording in report["recordings"]] == ["a", "b"]
     assert report["events"]["hand"]["n_events"] == 4  # pushes and releases

@@ -47,7 +47,7 @@ class Proposal(msgspec.Struct, frozen=True):
         columns: text of `--columns`.
         axes: text of `--axes`.
         unit: text of `--unit`.
-        findings: what is wrong with the readings without these options; `accept` does not take them.
+        findings: what is wrong without these options; `accept` does not take them.
     """
 
     path: str
@@ -82,9 +82,10 @@ class Proposal(msgspec.Struct, frozen=True):
         width = max(len(choice.what) for choice in self.choices)
         left = min(max(len(choice.value) for choice in self.choices), 40)
         is_said = all(choice.is_said for choice in self.choices)
+        problem = "cannot be imported so" if is_said else "does not say its layout"
         accept = "" if self.findings else "; --accept takes it as it is"
         lines = [
-            f"{self.path} {'cannot be imported so' if is_said else 'does not say its layout'}; it has",
+            f"{self.path} {problem}; it has",
             *(f"  {line}" for line in self.found),
             *textwrap.wrap("; ".join(self.findings), MAX_WIDTH, subsequent_indent="  "),
             "what it may be, and what speaks for it:",

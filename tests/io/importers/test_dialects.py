@@ -112,7 +112,7 @@ def test_stamps_that_do_not_increase_are_a_rate_in_the_proposal(tmp_path, times,
 
 def test_stamps_without_digits_say_no_rate(tmp_path):
     text = [",".join(HEAD), *rows(",", times=["1.76e9"] * N)]
-    with pytest.raises(RecordingError, match="digits are lost.*time=100Hz"):
+    with pytest.raises(RecordingError, match=r"digits are lost.*time=100Hz"):
         imported(tmp_path / "a.csv", text)
 
 

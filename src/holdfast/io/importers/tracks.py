@@ -1,4 +1,4 @@
-"""Which columns or arrays of a file are the taxels of which module, by names, shapes and options."""
+"""The columns or arrays of a file that are the taxels of a module: by names, shapes, options."""
 
 import glob
 import itertools
@@ -547,7 +547,7 @@ class _ArrayFinder:
         return tracks
 
     def _of_columns(self, named: Sequence[str], skin: Sensor) -> list[Track]:
-        """Return the tracks of single columns, in the first group that has taxels by their names."""
+        """Return the tracks of single columns, in the first group with names of taxels."""
         groups: dict[str, dict[str, StoredArray]] = {}
         for name in named:
             shape, (group, _, last) = self._arrays[name].shape, name.rpartition("/")
