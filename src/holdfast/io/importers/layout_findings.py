@@ -190,6 +190,8 @@ def _turned(normal: Array) -> Iterator[LayoutFinding]:
     change = normal - np.median(normal[:n_rest], axis=0)
     size = np.abs(change).mean(axis=1)
     pressed = change[size >= np.quantile(size, 0.9)].mean(axis=0)
+    if size[-n_rest:].mean() > 0.1 * size.max():  # it does not rest at its start or its end
+        return
     largest = float(np.abs(pressed).max())
     noise = float(np.median(normal[:n_rest].std(axis=0)))
     down = pressed < -TURNED_SHARE * largest
