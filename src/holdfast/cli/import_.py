@@ -123,8 +123,7 @@ def print_imported(result: "ImportResult", facts: dict[str, Any], *, as_json: bo
         )
         print_line(f"{n_recordings} with {n_modules} and {n_samples} in {result.out}")
     report_findings((document["name"], findings) for document, findings in result.imported)
-    if len(document["recordings"]) == 1:
+    if result.hint and document["recordings"]:
         path = document["recordings"][0]["path"]
         print_message(f"holdfast info {path} --plot import.png draws what was imported")
-    if result.hint:
         print_message(f"hint: {result.hint}")

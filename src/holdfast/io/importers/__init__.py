@@ -261,6 +261,8 @@ def _detected_format(path: Path) -> str:
         source = importer(name) if name in FORMATS else IMPORTER_PLUGINS.load(name)
         if source is not None and source.can_read(path):
             return name
+    if importer("csv").can_guess(path):
+        return "csv"
     names = f"{', '.join(FORMATS)}{IMPORTER_PLUGINS.text()}"
     raise RecordingError(
         f"{path} is of no supported format; there are {names} "

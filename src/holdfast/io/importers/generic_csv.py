@@ -21,10 +21,16 @@ from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 _COMMENT = re.compile(r"(?P<key>sensor|unit)\s*:\s*(?:(?P<module>[^=]+?)\s*=)?\s*(?P<value>\S+)")
+_OWN_TAXEL = re.compile(r"(?:.+[._])?t\d+[._][xyz]")
 _TEXT = re.compile(r"(?:.+\.)?(?:label|cause)")
 
 
 def can_read(path: Path) -> bool:
+    """Return whether `path` is a CSV file of holdfast, or a folder with one."""
+    return any(map(_is_own, map(header_line, csv_files(path))))
+
+
+def can_guess(path: Path) -> bool:
     """Return whether `path` is a CSV file, or a folder with one: by its name, or its columns."""
     files = csv_files(path)
     return any(file.suffix.lower() == ".csv" or _names_taxels(file, ()) for file in files)
@@ -85,6 +91,10 @@ def read(
         source = Source(file, arrays, "--sensor", stated, notes)
         for recording in recordings_of(source, sensors or {}, columns, report, accept=accept):
             yield replace(recording, name=f"{prefix}{recording.name}")
+
+
+def _is_own(names: Collection[str]) -> bool:
+    return "time" in names and any(map(_OWN_TAXEL.fullmatch, names))
 
 
 def _names_taxels(file: Path, n_taxels: Collection[int]) -> bool:

@@ -52,7 +52,6 @@ _FORMS = (
     # No number: the one taxel of a module.
     re.compile(r"(?P<head>.*?)(?P<axis>[xyz])(?P<tail>[\W_]*)", re.IGNORECASE),
 )
-_ONE_TAXEL = len(_FORMS) - 1
 _WORDS = re.compile(r"[a-z]+", re.IGNORECASE)
 Cells = Mapping[tuple[int, str], str]
 """Column by taxel (from 1) and axis."""
@@ -132,9 +131,7 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
         numbers = sorted({taxel for taxel, _ in cells})
         whole = [(taxel, axis) for taxel in numbers for axis in "xyz"]
         is_run = numbers[-1] - numbers[0] == len(numbers) - 1
-        fits = (
-            len(numbers) in n_taxels if n_taxels else len(numbers) > 1 or group.form == _ONE_TAXEL
-        )
+        fits = not n_taxels or len(numbers) in n_taxels
         if is_run and fits and len(cells) == len(whole):
             if group in doubled:
                 a, b = doubled[group]
