@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
-GRID = re.compile(r"\d+x\d+", re.IGNORECASE)
+GRID = re.compile(r"[1-9]\d*x[1-9]\d*", re.IGNORECASE)
 SENSOR_OPTIONS = ("--sensor", "--array", "--topic")
 LAYOUT_OPTIONS = (*SENSOR_OPTIONS, "--columns", "--axes", "--unit")
 """Options with a value that a proposal gives anew."""
@@ -109,7 +109,9 @@ class CsvOptions:
         sensors: dict[str, Sensor] = {}
         for key, name in sensor_texts(self.sensor or ()):
             if key in sensors:
-                raise ValueError(f"--sensor: two sensors given for {key if key != '*' else 'all'}")
+                raise ValueError(
+                    f"--sensor: two sensors given for {key if key != '*' else 'all modules'}"
+                )
             if GRID.fullmatch(name) is None:
                 sensors[key] = find_sensor(name)
             elif self.unit is None:

@@ -63,7 +63,7 @@ def grid_sensor(grid: str, pitch: float = 5.0, rate: float = 100.0, unit: str = 
     """Return a flat grid of taxels; arguments and errors as of `grid_file`."""
     rows, _, columns = grid.lower().partition("x")
     if not (rows.isdecimal() and columns.isdecimal() and int(rows) * int(columns)):
-        raise ValueError(f"ROWSxCOLUMNS such as 3x3 expected, {grid!r} given")
+        raise ValueError(f"--template: ROWSxCOLUMNS such as 3x3 expected, {grid!r} given")
     name, kept = f"grid-{grid.lower()}", "N" if unit == "N" else "count"
     return flat_sensor(name, int(rows), int(columns), 1e-3 * pitch, rate=rate, unit=kept)  # type: ignore[arg-type]
 
