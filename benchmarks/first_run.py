@@ -25,7 +25,8 @@ import numpy as np
 from holdfast.synthetic import synthetic_recording
 module = synthetic_recording("press", 0, ("thumb",)).modules["thumb"]
 rows = np.hstack([module.times[:, None], module.readings.reshape(module.n_samples, -1)])
-header = ",".join(["time", *(f"s{k}" for k in range(rows.shape[1] - 1))])
+names = [f"{axis}{k}" for k in range(rows.shape[1] // 3) for axis in "xyz"]
+header = ",".join(["time", *names])
 np.savetxt("press.csv", rows, delimiter=",", header=header, comments="")
 """
 

@@ -14,6 +14,7 @@ from holdfast.io import import_recordings, load_recording, save_recording
 from holdfast.io.dataset import load_dataset
 from holdfast.io.file_formats import is_recording
 from holdfast.io.importers import import_hint, import_parts
+from holdfast.io.importers.columns import Columns
 from holdfast.io.importers.table import name_prefixes
 from holdfast.labelling.review.findings import Finding, findings_of
 from holdfast.parallel import Engine
@@ -43,7 +44,8 @@ class ImportTask:
         out: folder for the recordings; it is created if missing.
         data_format: name of the format; None if it is detected, and for recordings of holdfast.
         sensors: by module; `"*"` is that of all others.
-        columns: of a CSV file, as the text of `--columns`; None to guess them.
+        columns: layout of the numbers; None if nothing is said of it.
+        accept: take the layout that is proposed.
         labels: import the labels of the input.
         suffix: of the recordings to write, `parquet` or `mcap`.
         force: replace existing files.
@@ -53,7 +55,8 @@ class ImportTask:
     out: Path
     data_format: str | None = None
     sensors: Mapping[str, Sensor] = field(default_factory=dict)
-    columns: str | None = None
+    columns: Columns | None = None
+    accept: bool = False
     labels: bool = True
     suffix: str = field(default_factory=lambda: "parquet" if is_installed("pyarrow") else "mcap")
     force: bool = False
@@ -176,6 +179,7 @@ def _import_part(
             columns=task.columns,
             report=report,
             limited=task.limited,
+            accept=task.accept,
         )
     written: list[Imported] = []
     for recording in recordings:

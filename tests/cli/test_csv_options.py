@@ -1,10 +1,12 @@
 """CSV files that `detect` and `evaluate` read without an import."""
 
 import json
+import shlex
 
 import numpy as np
 import pytest
 
+from cases import COMMAND
 from holdfast.cli import main
 from holdfast.sensors import flat_sensor
 
@@ -52,33 +54,32 @@ def run(capsys, *words, code=0):
 
 def test_detect_gives_what_it_gives_after_an_import(folder, sensor, capsys):
     write_press(folder / "press.csv")
-    out, err = run(capsys, "detect", "builtin:any", "press.csv", "--sensor", sensor)
+    words = ("--sensor", sensor, "--columns", "time=timestamp:ms")
+    out, _ = run(capsys, "detect", "builtin:any", "press.csv", *words)
     assert {path.name for path in folder.iterdir()} == {"press.csv", "sensor.json"}
-    assert "--columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in err.splitlines()[1]
-    run(capsys, "import", "press.csv", "out", "--sensor", sensor)
+    run(capsys, "import", "press.csv", "out", *words)
     assert run(capsys, "detect", "builtin:any", "out/press.parquet").out == out
 
 
 def test_columns_are_named_and_any_suffix_is_read(folder, sensor, capsys):
     write_press(folder / "press.log", "m{taxel}{axis}")
-    columns = "time=timestamp:ms,taxels=m{taxel}{axis}"
+    columns = "time=timestamp:ms,taxels=m0x..m8z"
     words = ("press.log", "--sensor", sensor, "--columns", columns, "--summary", "--json")
-    out, err = run(capsys, "detect", "builtin:any", *words)
+    out, _ = run(capsys, "detect", "builtin:any", *words)
     assert json.loads(out)["fingers"]["finger1"]["n_samples"] == N
-    assert "guess" not in err
 
 
 def test_evaluate_takes_the_labels_of_a_column(folder, sensor, capsys):
     (folder / "in").mkdir()
     for name in ("a", "b"):
         write_press(folder / "in" / f"{name}.csv", labelled=True)
-    out, err = run(capsys, "evaluate", "builtin:any", "in", "--sensor", sensor, "--json")
+    words = ("--sensor", sensor, "--columns", "time=timestamp:ms", "--json")
+    out, _ = run(capsys, "evaluate", "builtin:any", "in", *words)
     report = json.loads(out)
     assert [recording["name"] for recording in report["recordings"]] == ["a", "b"]
     assert report["events"]["hand"]["n_events"] == 4  # pushes and releases
     assert report["pooled"]["accuracy"] > 90
-    assert err.count("the columns are a guess") == 1
-    one = run(capsys, "evaluate", "builtin:any", "in/a.csv", "--sensor", sensor, "--json").out
+    one = run(capsys, "evaluate", "builtin:any", "in/a.csv", *words).out
     assert json.loads(one)["pooled"]["n"] == report["pooled"]["n"] / 2
 
 
@@ -86,5 +87,32 @@ def test_two_recordings_are_refused(folder, sensor, capsys):
     (folder / "in").mkdir()
     for name in ("a", "b"):
         write_press(folder / "in" / f"{name}.csv")
-    _, err = run(capsys, "detect", "builtin:any", "in", "--sensor", sensor, code=2)
+    words = ("in", "--sensor", sensor, "--columns", "time=timestamp:ms")
+    _, err = run(capsys, "detect", "builtin:any", *words, code=2)
     assert err.splitlines()[-1] == "holdfast: one recording expected, 2 given: in"
+
+
+def pasted(err):
+    """Return the words of the command of a proposal."""
+    command = COMMAND.search(err)[1].replace("\\\n", "")
+    return [shlex.split(part)[1:] for part in command.split("&&")]
+
+
+def test_detect_proposes_its_own_command(folder, sensor, capsys):
+    write_press(folder / "press log.csv")
+    _, err = run(capsys, "detect", "builtin:any", "press log.csv", "--sensor", sensor, code=2)
+    (words,) = pasted(err)
+    assert words[:3] == ["detect", "builtin:any", "press log.csv"]
+    assert words[3:] == ["--sensor", sensor, "--columns", "time=timestamp:ms"]
+    run(capsys, *words)
+
+
+@pytest.mark.parametrize("verb", [["info"], ["label"]])
+def test_verbs_of_recordings_propose_the_import_before_themselves(folder, capsys, verb):
+    write_press(folder / "press.csv")
+    _, err = run(capsys, *verb, "press.csv", code=2)
+    first, second = pasted(err)
+    assert first[:3] == ["import", "press.csv", "recordings"]
+    assert second == [*verb, "recordings"]
+    run(capsys, *first)
+    assert (folder / "recordings" / "press.parquet").is_file()

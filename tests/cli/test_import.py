@@ -5,6 +5,7 @@ import pytest
 
 from command_line import Verb
 from holdfast.cli import main
+from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.import_ import FormatOptions
 from holdfast.io import load_recording, save_recording
 from holdfast.io.importers import FORMATS, HINTS, IMPORTER_PLUGINS, import_hint
@@ -45,7 +46,10 @@ refusal, imported = VERB.refusal, VERB.document
 
 @pytest.mark.parametrize("no_limit", [False, True])
 def test_no_limit_reaches_the_reader(tmp_path, no_limit):
-    assert FormatOptions(no_limit=no_limit).task(tmp_path, force=False).limited is not no_limit
+    assert (
+        FormatOptions(no_limit=no_limit).task(tmp_path, CsvOptions(), force=False).limited
+        is not no_limit
+    )
 
 
 def test_imports_a_file(capsys, table, tmp_path):
@@ -119,7 +123,7 @@ class TestOutputs:
 
     def test_all_or_none(self, capsys, table, tmp_path):
         table("a.csv")
-        bad = table("b.csv", extra="\n1,2,3")
+        bad = table("b.csv", extra="\n1,2,3\n1,2,3")
         assert str(bad) in refusal(capsys, tmp_path / "in", tmp_path / "x" / "out")
         assert not (tmp_path / "x").exists()
 
@@ -172,14 +176,41 @@ class TestASensorOfOnesOwn:
 
     def test_from_a_file_to_a_recording(self, capsys, press, grid, tmp_path):
         code, _, err = VERB.run(capsys, press, tmp_path / "out", "--sensor", grid)
+        assert code == 2
+        assert "--columns time=timestamp:ms" in err
+        assert not (tmp_path / "out").exists()
+        code, _, err = VERB.run(capsys, press, tmp_path / "out", "--sensor", grid, "--accept")
         assert code == 0
-        assert "--columns 'time=timestamp:ms,taxels=F{axis}{taxel}'" in err
         # Findings are reported once.
         assert sum("(and 1 more)" in line for line in err.splitlines()) == 2
         module = load_recording(tmp_path / "out" / "a.parquet").modules["finger1"]
         assert (module.sensor.name, module.rate) == ("grid-3x3", pytest.approx(100.0))
 
     def test_a_sensor_by_module_and_columns(self, capsys, press, grid, tmp_path):
-        words = ["--sensor", f"finger1={grid}", "--columns", "time=timestamp,taxels=F{axis}{taxel}"]
+        columns = "time=timestamp:ms,taxels=Fx0..Fz8"
+        words = ["--sensor", f"finger1={grid}", "--columns", columns]
         imported(capsys, press / "a.csv", tmp_path / "out", *words)
         assert (tmp_path / "out" / "a.parquet").exists()
+
+    def test_a_plain_pad_needs_no_file(self, capsys, press, tmp_path):
+        words = ["--sensor", "3x3", "--unit", "mN", "--columns", "time=timestamp:ms"]
+        imported(capsys, press / "a.csv", tmp_path / "out", *words)
+        module = load_recording(tmp_path / "out" / "a.parquet").modules["finger1"]
+        assert (module.sensor.n_taxels, module.unit) == (9, "N")
+        assert module.readings[1, 0, 2] == pytest.approx(0.003)
+        assert "--unit" in refusal(capsys, press / "a.csv", tmp_path / "x", "--sensor", "3x3")
+
+    def test_accept_does_not_take_a_finding(self, capsys, press, tmp_path):
+        text = (press / "a.csv").read_text().replace("\n", ",-9999,-9999,-9999\n")
+        text = text.replace("-9999,-9999,-9999", "Fx9,Fy9,Fz9", 1).replace("Fx", "Gx", 0)
+        lines = text.splitlines()
+        (press / "a.csv").write_text(
+            "\n".join([lines[0], *(line if k % 3 else line.rsplit(",", 3)[0] + ",1,2,3"
+                                   for k, line in enumerate(lines[1:]))]) + "\n"
+        )  # fmt: skip
+        words = ["--sensor", "1x10", "--unit", "count", "--columns", "time=timestamp:ms"]
+        code, _, err = VERB.run(capsys, press / "a.csv", tmp_path / "out", *words, "--accept")
+        assert code == 2
+        assert "missing=-9999" in err
+        words[-1] += ",missing=-9999"
+        imported(capsys, press / "a.csv", tmp_path / "out", *words)

@@ -50,14 +50,15 @@ def public_box(folder, data_folder, monkeypatch):
 
 @pytest.fixture
 def csv_recordings(folder):
-    """A function that writes grasps as CSV files with channels that have numbers to a folder."""
+    """A function that writes grasps as CSV files to a folder."""
 
     def write(name):
         (folder / name).mkdir()
         for seed in (0, 1, 2):
             (module,) = synthetic_recording(f"grasp{seed}", seed, ("thumb",)).modules.values()
             columns = np.c_[module.times, module.readings.reshape(module.n_samples, -1)]
-            names = ["time", *(f"s{k}" for k in range(columns.shape[1] - 1))]
+            taxels = range(module.sensor.n_taxels)
+            names = ["time", *(f"{axis}{taxel}" for taxel in taxels for axis in "xyz")]
             np.savetxt(
                 folder / name / f"grasp{seed}.csv", columns, delimiter=",",
                 fmt=["%.6f"] + ["%d"] * (columns.shape[1] - 1),

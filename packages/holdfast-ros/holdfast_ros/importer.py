@@ -16,10 +16,9 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_conversion import recordings_of_arrays
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
+from holdfast.io.importers.reading import ANY_MODULE, Source, recordings_of
 from holdfast.io.importers.table import first_texts
-from holdfast.io.importers.table_conversion import ANY_MODULE
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array
@@ -69,14 +68,17 @@ def read(
     sensors: Mapping[str, Sensor] | None = None,
     columns: Columns | None = None,
     report: Callable[[str], None] = lambda _: None,
+    *,
+    accept: bool = False,
 ) -> Iterator[Recording]:
     """Yield the recording in a bag.
 
     Args:
         path: path of the bag.
         sensors: sensor by topic, or by `TOPIC.FIELD`: any numbers in its messages are read.
-        columns: as in `recordings_of_arrays`.
-        report: as in `recordings_of_arrays`.
+        columns: as in `recordings_of`.
+        report: as in `recordings_of`.
+        accept: as in `recordings_of`.
 
     Raises:
         RecordingError: it is damaged or has no known topic.
@@ -87,7 +89,8 @@ def read(
             return
         wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
         arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
-    yield from recordings_of_arrays(path, arrays, wanted, columns, report, "--topic")
+    source = Source(path, arrays, "--topic")
+    yield from recordings_of(source, wanted, columns, report, accept=accept)
 
 
 def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from holdfast.errors import RecordingError
 from holdfast.io.cdr import MessageDecoder
-from holdfast.io.importers.array_conversion import StoredArray, arrays_of_records, joined_axes
+from holdfast.io.importers.stored import StoredArray, arrays_of_records, joined_axes
 from holdfast.io.importers.table import first_texts
 from holdfast_ros.bags import Bag
 

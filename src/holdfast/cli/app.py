@@ -23,7 +23,13 @@ from typer.main import get_command
 from holdfast.cli.extensions import PluginOptions
 from holdfast.cli.options import RARE
 from holdfast.cli.terminal.console import break_silence, print_error, print_line, print_message
-from holdfast.errors import PACKAGE_PARTS, HoldfastError, missing_extra, missing_part
+from holdfast.errors import (
+    PACKAGE_PARTS,
+    HoldfastError,
+    RecordingError,
+    missing_extra,
+    missing_part,
+)
 from holdfast.plugins import PluginGroup
 from holdfast.removed import removal
 
@@ -124,7 +130,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     # Also SystemExit and KeyboardInterrupt: `_report` has the exit code of each.
     except BaseException as failure:
-        return _report(failure)
+        return _report(failure, words)
     return code
 
 
@@ -406,7 +412,7 @@ def _placeholder() -> None:
     """Do nothing; in place of a verb that is not imported."""
 
 
-def _report(failure: BaseException) -> int:
+def _report(failure: BaseException, words: Sequence[str]) -> int:
     if os.environ.get("HOLDFAST_DEBUG"):  # the traceback, before the line for users
         traceback.print_exception(failure)
     # The message then names the extra, and the command that installs it.
@@ -427,6 +433,11 @@ def _report(failure: BaseException) -> int:
             text = failure.format_message().rstrip(".")  # type: ignore[attr-defined]
             path = getattr(context, "command_path", "holdfast")
             print_error(str(missing) if missing else f"{text} (see {path} --help)")
+            return EXIT_BAD_INPUT
+        case RecordingError() if hasattr(failure, "proposal"):
+            from holdfast.cli.csv_options import print_proposal
+
+            print_proposal(failure, words)  # type: ignore[arg-type]
             return EXIT_BAD_INPUT
         case _ if isinstance(failure, _EXPECTED_ERRORS):
             text = str(failure) or type(failure).__name__

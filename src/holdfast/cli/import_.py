@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from holdfast.cli.csv_options import ColumnsOption, SensorsOption, parse_sensors, report_findings
+from holdfast.cli.csv_options import CsvOptions, report_findings
 from holdfast.cli.options import RARE, EngineOptions, ForceOption, JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
@@ -31,8 +31,6 @@ class FormatOptions:
         str | None,
         typer.Option("--format", help="Format of the input; detected from the content by default."),
     ] = None
-    sensor: SensorsOption = None
-    columns: ColumnsOption = None
     no_labels: Annotated[
         bool, typer.Option("--no-labels", help="Do not import the labels of the input.")
     ] = False
@@ -52,16 +50,16 @@ class FormatOptions:
         ),
     ] = None
 
-    def task(self, out: Path, *, force: bool) -> "ImportTask":
+    def task(self, out: Path, layout: CsvOptions, *, force: bool) -> "ImportTask":
         """Return how each part of the input is imported.
 
         Raises:
-            ValueError: a module has two sensors, or a sensor is unknown or not valid.
+            ValueError: a module has two sensors, or a sensor or the layout is not valid.
         """
         from holdfast.import_tasks import ImportTask
 
         task = ImportTask(
-            out, self.data_format, parse_sensors(self.sensor or ()), self.columns,
+            out, self.data_format, layout.sensors(), layout.layout, accept=layout.accept,
             labels=not self.no_labels, force=force, limited=not self.no_limit,
         )  # fmt: skip
         # Without the option, the task chooses the format by what is installed.
@@ -74,6 +72,7 @@ def import_(
         Path, typer.Argument(help="Folder for the recordings; it is created if missing.")
     ],
     options: FormatOptions,
+    layout: CsvOptions,
     parallel: EngineOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -84,21 +83,21 @@ def import_(
     was cut off, everything up to the cut is recovered. Write OUT/NAME.parquet for each recording.
     If one of them fails, none is written.
 
-    A CSV file of any other logger needs its sensor. Its columns are guessed from the header; the
-    guess is shown first, as the text of --columns, which corrects it
-    (docs/tutorials/own-sensor.md).
+    A file of any other logger needs its sensor. What its names and shapes say is read at once. For
+    what they do not say, a command is proposed that says it; --accept takes it as it stands
+    (docs/importing.md).
 
     Example:
       holdfast import data/uskin_pick_move real/
       holdfast import log.csv real/ --format xela-log --no-labels
       holdfast import press.csv real/ --sensor sensor.json
       holdfast import press.csv real/ --sensor anyskin \
-        --columns 'time=t:ms,taxels=m{taxel}{axis}'
+        --columns time=t:ms,taxels=2..16
       holdfast import cut.mcap recovered/
     """
     from holdfast.import_tasks import import_all
 
-    engine, task = parallel.start(), options.task(out, force=force)
+    engine, task = parallel.start(), options.task(out, layout, force=force)
     result = import_all(path, task, engine, notify=print_message, steps=progress)
     print_imported(result, {}, as_json=as_json)
 
@@ -124,5 +123,7 @@ def print_imported(result: "ImportResult", facts: dict[str, Any], *, as_json: bo
         )
         print_line(f"{n_recordings} with {n_modules} and {n_samples} in {result.out}")
     report_findings((document["name"], findings) for document, findings in result.imported)
-    if result.hint:
+    if result.hint and document["recordings"]:
+        path = document["recordings"][0]["path"]
+        print_message(f"holdfast info {path} --plot import.png draws what was imported")
         print_message(f"hint: {result.hint}")

@@ -32,13 +32,14 @@ import numpy.typing as npt
 from holdfast.children import python_command
 from holdfast.errors import EXTRA_MODULES, RecordingError
 from holdfast.io.header import decode_header, encode_header, header_of
+from holdfast.io.proposals import Proposal, ProposalError
 from holdfast.io.safe_reading import recording_errors
 from holdfast.io.timed_arrays import array_specs, arrays_of, recording_from
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
 if TYPE_CHECKING:
-    from holdfast.io.importers.csv_columns import Columns
+    from holdfast.io.importers.columns import Columns
 
 MAX_MEMORY = 1 << 30
 """Memory that reading a file may take in the child [bytes]."""
@@ -75,7 +76,7 @@ class _Request(msgspec.Struct, frozen=True):
 class _Answer(msgspec.Struct, frozen=True):
     """What came of it: a value in the file, the end of the values, or an error and its text."""
 
-    kind: Literal["ready", "value", "end", "memory", "error"]
+    kind: Literal["ready", "value", "end", "memory", "error", "proposal"]
     text: str = ""
 
 
@@ -87,6 +88,7 @@ def read_foreign(
     report: Callable[[str], None] = lambda _: None,
     *,
     limited: bool = True,
+    accept: bool = False,
 ) -> Iterator[Recording]:
     """Yield the recordings in a file or folder of a format, which a child process reads.
 
@@ -97,12 +99,14 @@ def read_foreign(
         columns: the same.
         report: the same.
         limited: the same.
+        accept: the same.
 
     Raises:
+        ProposalError: the file does not say its layout.
         RecordingError: the child refuses it, ends, or takes more time or memory than it may.
     """
     given = {key: one.to_dict() for key, one in (sensors or {}).items()}
-    options = {"format": name, "sensors": given, "columns": columns}
+    options = {"format": name, "sensors": given, "columns": columns, "accept": accept}
     for document, arrays in _values("import", path, options, limited=limited):
         if not arrays:
             report(os.fsdecode(document))
@@ -190,6 +194,8 @@ def _values(
         needs = f"{path} needs more than 1 GiB of memory: {WAY_OUT}"
         raise RecordingError(needs if limited else answer.text)
     _idle.append(child)
+    if answer.kind == "proposal":
+        raise ProposalError(msgspec.json.decode(answer.text, type=Proposal))
     if answer.kind == "error":
         raise RecordingError(answer.text)
 
@@ -325,6 +331,8 @@ def _next_answer(values: Iterator[tuple[bytes, Arrays]], path: Path) -> _Answer:
                 for array in (np.frombuffer(document, np.uint8), *arrays):
                     np.lib.format.write_array(file, array, allow_pickle=False)
             return _Answer("value")
+    except ProposalError as cause:
+        return _Answer("proposal", msgspec.json.encode(cause.proposal).decode())
     except Exception as cause:
         text = str(cause)[:MAX_TEXT].encode(errors="backslashreplace").decode()
         # A library may hide that no memory is left behind an error of its own.
@@ -353,7 +361,7 @@ def _read(request: _Request) -> Iterator[tuple[bytes, Arrays]]:
 def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]:
     """Yield the recordings in a file, and the reports about them."""
     from holdfast.io.importers import extra_of, importer, takes_sensors
-    from holdfast.io.importers.csv_columns import Columns
+    from holdfast.io.importers.columns import Columns
 
     name = str(request.options["format"])
     source = importer(name)
@@ -362,13 +370,14 @@ def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]
         import_module(module)
     _limit_memory(request)
     lines: list[str] = []
-    more: tuple[object, ...] = ()
+    more: dict[str, object] = {}
     if takes_sensors(name):
         sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
         columns = msgspec.convert(request.options["columns"], Columns | None)
-        more = sensors, columns, lines.append
+        more = {"sensors": sensors, "columns": columns, "report": lines.append}
+        more["accept"] = request.options["accept"]
     try:
-        for recording in source.read(path, *more):
+        for recording in source.read(path, **more):
             yield from _texts(lines)
             header = header_of(recording, path.stem)
             pairs = arrays_of(recording).values()

@@ -16,6 +16,7 @@ import numpy as np
 from holdfast.devices.sources import Source, open_source
 from holdfast.errors import SourceError
 from holdfast.files import read_input, write_whole
+from holdfast.io.importers.layout_findings import layout_findings
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED
 from holdfast.sensors import Sensor, taxel_number
 from holdfast.sensors.types import Array, Flags
@@ -90,12 +91,14 @@ class HealthCheck(msgspec.Struct, frozen=True):
         n_lost: number of packets that are missing by the device's own counter.
         modules: health by module.
         touch: module that was touched first, and when [s]; what precedes was checked.
+        layout: findings about the layout of the readings.
     """
 
     date: str
     n_lost: int
     modules: dict[str, ModuleHealth]
     touch: tuple[str, float] | None = None
+    layout: tuple[str, ...] = ()
 
 
 def check_health(source: Source, seconds: float) -> HealthCheck:
@@ -133,13 +136,15 @@ def check_health(source: Source, seconds: float) -> HealthCheck:
         if (at := first_touch(name, source.sensors[name], times, readings)) is not None:
             touches.append((float(times[0]) + at, name))
     end, touched = min(touches, default=(math.inf, ""))
-    modules = {}
+    modules, layout = {}, []
     for name, (times, readings) in arrays.items():
         # The means in which the touch was found begin earlier.
         n = int(np.searchsorted(times, end - AVERAGED_SECONDS))
         modules[name] = module_health(name, source.sensors[name], times[:n], readings[:n])
+        found = layout_findings(readings[:n], source.sensors[name], modules[name].unit)
+        layout += [f"{name}: {finding.text}" for finding in found]
     touch = (touched, round(end - first, 1)) if touches else None
-    return HealthCheck(date.today().isoformat(), n_lost, modules, touch)
+    return HealthCheck(date.today().isoformat(), n_lost, modules, touch, tuple(layout))
 
 
 def check_and_keep(
@@ -162,7 +167,7 @@ def check_and_keep(
     with open_source(uri, speed=0) as source:
         check = check_health(source, seconds)
     last = earlier[-1] if earlier else None
-    findings = changes_since(check, last)
+    findings = [*check.layout, *changes_since(check, last)]
     keep(path, earlier, check)
     return check, last, findings
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from holdfast.contact import ContactState
@@ -17,6 +18,7 @@ from holdfast.plots.style import (
     add_labels,
     add_title,
     default_settings,
+    page_figure,
     style_axes,
 )
 from holdfast.plots.time_series import draw_line, equal_spans
@@ -26,6 +28,15 @@ FINGER_HEIGHT = 1.5
 """Height of the axes of a finger [inch]."""
 STATE_ALPHA = 0.35
 STATES = tuple(ContactState)
+
+
+@default_settings()
+def figure_of_detection(detection: Detection) -> Figure:
+    """Return a figure with what `plot_detection` draws, without a screen."""
+    n = len(detection.fingers)
+    figure = page_figure(n * FINGER_HEIGHT + 0.4)
+    plot_detection(detection, list(figure.subplots(n, sharex=True, squeeze=False)[:, 0]))
+    return figure
 
 
 @default_settings()

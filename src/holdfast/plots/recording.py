@@ -2,6 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -44,6 +46,10 @@ ROW_HEIGHTS = {"force": 1.75, "sigma": 0.9, "slip": 0.75, "decision": 0.75}
 LEGEND_HEIGHT = 0.75
 MAX_FINGERS_IN_COLUMN = 3
 SHADE_ALPHA = 0.25
+REST_SECONDS = 0.5
+"""Time at the start from which the change of z is counted [s]."""
+MAP_BOX = (0.85, 0.45, 0.15, 0.45)
+"""Place of the map of the taxels, as fractions of the axes of the force."""
 MARKER_LETTER_WIDTH = 0.011
 """Width of a letter of a marker, as a fraction of the width of the axes."""
 
@@ -169,9 +175,29 @@ def _draw_finger(
     add_labels(force, y=f"force {series.unit_label}")
     draw_sigma(sigma, series)
     add_labels(sigma, y=f"σ {series.unit_label}")
+    _draw_taxels(force, module, series.amplitude)
     list(panels.values())[-1].tick_params(labelbottom=True)
     if "slip" in panels:
         draw_slip_speed(panels["slip"], series)
+
+
+def _draw_taxels(axes: Axes, module: Tactile, amplitude: npt.NDArray[np.float64]) -> None:
+    """Draw z of each taxel at the largest force, since the start: red above, blue below zero."""
+    if module.sensor.n_taxels < 2 or len(amplitude) != module.n_samples:
+        return
+    normal = module.readings[..., 2].astype(np.float64)
+    at = int(np.argmax(np.nan_to_num(amplitude)))
+    change = normal[at] - normal[: max(1, int(module.rate * REST_SECONDS))].mean(axis=0)
+    largest = float(np.abs(np.nan_to_num(change)).max()) or 1.0
+    # Seen along the axis in which the sensor is thinnest.
+    along = np.sort(np.argsort(np.ptp(module.sensor.positions, axis=0))[1:])
+    across, up = module.sensor.positions[:, along].T
+    box = axes.inset_axes(MAP_BOX)
+    box.scatter(across, up, s=9, c=change, cmap="coolwarm", vmin=-largest, vmax=largest)
+    box.set_title("z at the largest force", fontsize=FONT_SIZE - 2, pad=1)
+    box.set_aspect("equal")
+    box.margins(0.2)
+    box.set_axis_off()
 
 
 def _draw_markers(axes: Sequence[Axes], recording: Recording, origin: float, named: bool) -> None:

@@ -51,6 +51,15 @@ def find_layout(name: str, base: str | None) -> Sensor | Hand:
     return hand(name) if name in built_in_hands() else find_sensor(name)
 
 
+def grid_sensor(grid: str, pitch: float = 5.0, rate: float = 100.0, unit: str = "count") -> Sensor:
+    """Return a flat grid of taxels; arguments and errors as of `grid_file`."""
+    rows, _, columns = grid.lower().partition("x")
+    if not (rows.isdecimal() and columns.isdecimal() and int(rows) * int(columns)):
+        raise ValueError(f"--template: ROWSxCOLUMNS such as 3x3 expected, {grid!r} given")
+    name, kept = f"grid-{grid.lower()}", "N" if unit == "N" else "count"
+    return flat_sensor(name, int(rows), int(columns), 1e-3 * pitch, rate=rate, unit=kept)  # type: ignore[arg-type]
+
+
 def grid_file(grid: str, pitch: float, rate: float, unit: str) -> str:
     """Return the JSON file of a flat grid, one line for each taxel.
 
@@ -63,17 +72,11 @@ def grid_file(grid: str, pitch: float, rate: float, unit: str) -> str:
     Raises:
         ValueError: one of them is not valid.
     """
-    rows, _, columns = grid.lower().partition("x")
-    if not (rows.isdecimal() and columns.isdecimal() and int(rows) * int(columns)):
-        raise ValueError(f"--template: ROWSxCOLUMNS such as 3x3 expected, {grid!r} given")
     if not 0 < pitch < math.inf:
         raise ValueError(f"--pitch: a distance above 0 mm expected, {pitch:g} given")
     if unit not in ("count", "N"):
         raise ValueError(f"--unit: count or N expected, {unit!r} given")
-    made = flat_sensor(
-        f"grid-{grid.lower()}", int(rows), int(columns), 1e-3 * pitch,
-        rate=rate, unit="N" if unit == "N" else "count",
-    )  # fmt: skip
+    made = grid_sensor(grid, pitch, rate, unit)
     fields = []
     for key, value in made.to_dict().items():
         text = json.dumps(value)

@@ -9,9 +9,11 @@ import pytest
 
 from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
-from holdfast.io.importers.array_conversion import StoredArray, recordings_of_arrays
 from holdfast.io.importers.arrays import arrays_of_hdf5
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
+from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.stored import StoredArray, in_memory
+from holdfast.io.proposals import ProposalError
 from holdfast.sensors import sensor
 
 SKIN = sensor("anyskin")
@@ -93,13 +95,14 @@ DEMOS = {
         f"data/demo_{k}/timestamp": TIMES,
     }.items()
 }
+NOISE = np.random.default_rng(8).normal(0, 1, (N, 5, 3))
 TAXELS = [{"id": k, "dx": 0.1, "dy": 0.2, "dz": 0.3} for k in range(5)]
 
 ONE = {
     "samples, taxels, axes": lambda p: npz(p, tactile=READINGS, t=TIMES),
     "samples, numbers": lambda p: npz(p, tactile=FLAT, t=TIMES),
     "numbers, samples": lambda p: npz(p, tactile=FLAT.T, time=TIMES),
-    "samples, axes, taxels, ms": lambda p: npz(p, m=READINGS.swapaxes(1, 2), time_ms=1e3 * TIMES),
+    "ms": lambda p: npz(p, m=READINGS, time_ms=1e3 * TIMES),
     "taxels, axes, samples, ns": lambda p: npz(
         p, m=READINGS.transpose(1, 2, 0), stamps_ns=(1e9 * TIMES).astype(int) + 10**18
     ),
@@ -107,7 +110,6 @@ ONE = {
         p, tactile=READINGS, wrench=np.zeros((N, 6)), q=np.zeros((N, 7)), t=TIMES[:, None]
     ),
     "a rate": lambda p: npz(p, tactile=READINGS, fs=100),
-    "npy with the time first": lambda p: npy(p, np.column_stack([TIMES, FLAT])),
     "npy of fields": lambda p: npy(p, FIELDS),
     "MATLAB 5": lambda p: mat(p, data={"F": READINGS, "t": TIMES}),
     "MATLAB 5, columns": lambda p: mat(p, F=FLAT.T, t=TIMES[:, None]),
@@ -153,8 +155,8 @@ ONE = {
 }  # fmt: skip
 
 
-def imported(file, sensors, columns=None, report=lambda _: None):
-    recordings = import_recordings(file, sensors=sensors, columns=columns, report=report)
+def imported(file, sensors, columns=None, **words):
+    recordings = import_recordings(file, sensors=sensors, columns=columns, **words)
     return {one.name: dict(one.modules) for one in recordings}
 
 
@@ -167,12 +169,24 @@ def check(found, expected):
             np.testing.assert_allclose(np.diff(found[name][module].times), 0.01, atol=1e-5)
 
 
-@pytest.mark.parametrize("write", ONE.values(), ids=ONE)
-def test_one_array_that_fits(tmp_path, write):
-    reported = []
-    check(imported(write(tmp_path / "a"), {"*": SKIN}, report=reported.append), ALONE)
-    assert len(reported) == 2
-    assert "100 Hz, finger1 5 taxels" in reported[0]
+AT_ONCE = {
+    "samples, taxels, axes", "taxels, axes, samples, ns", "beside other arrays", "a rate", "ms",
+    "npy of fields", "MATLAB 7.3, axes", "HDF5", "HDF5, time above", "HDF5, rate", "HDF5 of fields",
+    "MATLAB 5", "Parquet of nested lists", "Parquet of columns", "lines of numbers", "a document",
+}  # fmt: skip
+"""Arrays whose names and last axes say what they are; all others are proposed."""
+
+
+@pytest.mark.parametrize("name", ONE)
+def test_one_array_that_fits(tmp_path, name):
+    reported, file = [], ONE[name](tmp_path / "a")
+    if name not in AT_ONCE:
+        with pytest.raises(ProposalError):
+            imported(file, {"*": SKIN})
+    accept = name not in AT_ONCE
+    check(imported(file, {"*": SKIN}, report=reported.append, accept=accept), ALONE)
+    assert len(reported) == 1
+    assert "100 Hz" in reported[0]
 
 
 DEMO_NAMES = {f"a-demo_{k}": {"finger1": READINGS + k} for k in range(11)}
@@ -181,6 +195,10 @@ SEVERAL = {
                     {"a": {"finger1": READINGS, "finger2": -READINGS}}),
     "two arrays": (lambda p: npz(p, l=READINGS, r=-READINGS, t=TIMES), ("l", "r"),
                    {"a": {"l": READINGS, "r": -READINGS}}),
+    "arrays of fingers": (lambda p: npz(p, left=READINGS, right=-READINGS, t=TIMES), ("*",),
+                          {"a": {"left": READINGS, "right": -READINGS}}),
+    "normal and shear": (lambda p: npz(p, f=READINGS[..., 2], s=READINGS[..., :2], t=TIMES),
+                         ("s+f",), ALONE),
     "episodes first": (lambda p: npz(p, F=np.stack([READINGS, -READINGS, 2 * READINGS]), t=TIMES),
                        ("F",),
                        {f"a-{k}": {"finger1": s * READINGS} for k, s in ((1, 1), (2, -1), (3, 2))}),
@@ -195,7 +213,7 @@ SEVERAL = {
                           ("*",), {"a-0": {"finger1": READINGS}, "a-1": {"finger1": 2 * READINGS}}),
     "sensors by lines": (lambda p: lines(p, ({"time": t, "sensor": name, "data": x}
                                              for t, x in samples() for name in ("left", "right"))),
-                         ("*",), {"a": {"left": READINGS, "right": READINGS}}),
+                         ("data",), {"a": {"left": READINGS, "right": READINGS}}),
 }  # fmt: skip
 
 
@@ -212,7 +230,9 @@ def test_columns_say_the_rate_the_signs_and_the_recordings(tmp_path):
     half = {f"a-{k}": {"finger1": READINGS[60 * k - 180 :][:60]} for k in (3, 4)}
     check(imported(file, {"*": SKIN}, "episode=k"), half)
     turned = {"a": {"finger1": READINGS * [1, -1, -1]}}
-    check(imported(file, {"F": SKIN}, "signs=+--"), turned)
+    check(imported(file, {"F": SKIN}, Columns(axes=(1, -2, -3))), turned)
+    six = npz(tmp_path / "a", F=np.concatenate([READINGS[..., 2:], READINGS], axis=-1), t=TIMES)
+    check(imported(six, {"F": SKIN}, Columns(axes=(2, 3, 1))), ALONE)
 
 
 def test_rows_of_a_grid_of_matlab_keep_their_order(tmp_path):
@@ -222,25 +242,29 @@ def test_rows_of_a_grid_of_matlab_keep_their_order(tmp_path):
 
 
 REFUSED = {
-    "without a sensor": (lambda p: npz(p, F=READINGS, t=TIMES), (), "--array F=SENSOR"),
-    "no times": (lambda p: npz(p, F=READINGS), ("F",), "--columns time=100Hz"),
-    "two that fit": (lambda p: npz(p, left=READINGS, right=READINGS, t=TIMES), ("*",),
-                     "--array left=anyskin --array right=anyskin"),
-    "fingers": (lambda p: hdf5(p, {"finger1/F": READINGS, "finger2/F": READINGS}), ("*",),
-                "--array finger1/F=anyskin --array finger2/F=anyskin"),
-    "units": (lambda p: lines(p, ({"t": t, "p": [row | {"fx": 1.0, "fy": 0.0, "fz": 2.0}
-                                                for row in TAXELS]} for t in TIMES.tolist())),
-              ("*",), "--array p/d=anyskin --array p/f=anyskin"),
+    "no times": (lambda p: npz(p, F=READINGS), ("F",), "time=100Hz"),
+    "fingers without times": (lambda p: hdf5(p, {"finger1/F": READINGS, "finger2/F": READINGS}),
+                              ("*",), "time=100Hz"),
     "another path": (lambda p: hdf5(p, DEMOS), ("tactil",), "'tactil'"),
     "another sensor": (lambda p: npz(p, F=READINGS[:, :4], t=TIMES), ("F",), "(120, 4, 3)"),
-    "force and torque": (lambda p: npz(p, F=np.zeros((N, 5, 6)), t=TIMES), ("F",), "(120, 5, 6)"),
+    "windows": (lambda p: npz(p, F=READINGS.reshape(12, 10, 5, 3), t=TIMES[:12]), ("F",),
+                "numpy.reshape"),
+    "axis, taxel": (lambda p: npz(p, F=READINGS.swapaxes(1, 2), t=TIMES), ("F",),
+                    "numpy.swapaxes"),
+    "the time first": (lambda p: npy(p, np.column_stack([TIMES, FLAT])), ("*",),
+                       "time=1,taxels=2..16"),
     "normal force": (lambda p: npz(p, F=READINGS[..., 2], t=TIMES), ("F",), "three axes"),
     "shear": (lambda p: npz(p, F=READINGS[..., :2], t=TIMES), ("*",), "three axes"),
+    "no reading": (lambda p: npz(p, torque=READINGS, t=TIMES), ("*",), "torque is a torque"),
+    "two clocks": (lambda p: hdf5(p, {"l/F": READINGS, "l/t": TIMES, "r/F": READINGS,
+                                      "r/t": TIMES + 90}), ("l/F", "r/F"), "do not overlap"),
+    "number 4": (lambda p: npz(p, F=READINGS, t=TIMES), ("F", (1, 2, 4)), "number 4"),
     "a pickle": (lambda p: (p.with_suffix(".pkl"), p.with_suffix(".pkl").write_bytes(b"x"))[0],
                  ("*",), "numpy.savez('a.npz', **arrays)"),
     "objects": (lambda p: npy(p, np.array([{}])), ("*",), "a.npy is a pickle"),
     "nothing": (lambda p: (p.with_suffix(".npz"), p.with_suffix(".npz").touch())[0], ("*",),
                 "a.npz is empty"),
+    "zarr": (lambda p: (p.mkdir(), (p / ".zgroup").touch(), p)[2], ("data/F",), "zarr.open('a')"),
 }  # fmt: skip
 
 
@@ -248,9 +272,51 @@ REFUSED = {
 def test_what_cannot_be_read_has_the_command_that_works(tmp_path, monkeypatch, write, keys, text):
     monkeypatch.chdir(tmp_path)
     file = write(tmp_path / "a").relative_to(tmp_path)
+    axes = next((key for key in keys if isinstance(key, tuple)), None)
+    keys = [key for key in keys if isinstance(key, str)]
     with pytest.raises(RecordingError, match=re.escape(text)) as caught:
-        imported(file, dict.fromkeys(keys, SKIN))
+        imported(file, dict.fromkeys(keys, SKIN), Columns(axes=axes))
     assert "\n" not in str(caught.value)
+    assert not isinstance(caught.value, ProposalError)
+
+
+POINTS = ({"t": t, "p": [row | {"fx": 1.0, "fy": 0.0, "fz": 2.0} for row in TAXELS]} for t in TIMES)
+WRENCH = np.concatenate([READINGS, 0.1 * NOISE], axis=-1)
+PROPOSED = {
+    "without a sensor": (lambda p: npz(p, F=READINGS, t=TIMES), (), ["--sensor", "anyskin"]),
+    "two that fit": (lambda p: npz(p, force=READINGS, raw=READINGS, t=TIMES), ("*",),
+                     ["--array", "force=*"]),
+    "force and displacement": (lambda p: lines(p, POINTS), ("*",), ["--array", "p/f=*"]),
+    "flat fingers": (lambda p: npz(p, left=FLAT, right=FLAT, t=TIMES), ("*",),
+                     ["--array", "left=*", "--array", "right=*"]),
+    "force and torque": (lambda p: npz(p, F=WRENCH, t=TIMES), ("F",),
+                         ["--array", "F=F", "--axes=1,2,3"]),
+    "displacement and force": (lambda p: npz(p, F=np.concatenate([READINGS / 10, READINGS], -1),
+                                             t=TIMES), ("*",), ["--array", "F=*", "--axes=4,5,6"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("write", "keys", "options"), PROPOSED.values(), ids=PROPOSED)
+def test_what_is_not_said_is_proposed(tmp_path, write, keys, options):
+    with pytest.raises(ProposalError) as caught:
+        imported(write(tmp_path / "a"), dict.fromkeys(keys, SKIN))
+    assert caught.value.proposal.options({}) == options
+
+
+def test_records_are_ordered_by_their_ids(tmp_path):
+    order = np.random.default_rng(0).permuted(np.tile(np.arange(5), (N, 1)), axis=1)
+    records = (
+        {"t": t, "p": [{"id": int(k), **dict(zip("xyz", x[k], strict=True))} for k in ids]}
+        for t, x, ids in zip(TIMES.tolist(), READINGS.tolist(), order, strict=True)
+    )
+    check(imported(lines(tmp_path / "a", records), {"*": SKIN}), ALONE)
+
+
+def test_each_array_keeps_its_own_times(tmp_path):
+    arrays = {"l/F": READINGS, "l/t": TIMES, "r/F": READINGS[30:], "r/t": TIMES[30:]}
+    modules = imported(hdf5(tmp_path / "a", arrays), dict.fromkeys(("l/F", "r/F"), SKIN))["a"]
+    assert modules["r"].times[0] == pytest.approx(0.3)
+    np.testing.assert_array_equal(modules["r"].readings, modules["l"].readings[30:])
 
 
 def external_link(content, other):
@@ -312,11 +378,11 @@ def test_only_the_last_line_of_json_may_be_cut(tmp_path):
     file = lines(tmp_path / "a", ({"t": t, "data": x} for t, x in samples()))
     text = file.read_text()
     file.write_text(text[:-30])
-    module = imported(file, {"*": SKIN})["a"]["finger1"]
+    module = imported(file, {"data": SKIN})["a"]["finger1"]
     np.testing.assert_array_equal(module.readings, READINGS[:-1])
     file.write_text(text.replace('"data"', '"data', 1))
     with pytest.raises(RecordingError, match="record 1"):
-        imported(file, {"*": SKIN})
+        imported(file, {"data": SKIN})
 
 
 def test_an_array_of_several_recordings_is_read_once(tmp_path):
@@ -327,9 +393,7 @@ def test_an_array_of_several_recordings_is_read_once(tmp_path):
         return np.random.default_rng(0).normal(size=(3, 80, 5, 3))
 
     stored = StoredArray((3, 80, 5, 3), "f", values)
-    columns = Columns.parse("time=100Hz")
-    made = recordings_of_arrays(
-        tmp_path / "set.h5", {"tactile": stored}, {"tactile": SKIN}, columns, lambda _: None
-    )
+    source = Source(tmp_path / "set.h5", {"tactile": stored, "t": in_memory(np.arange(80) / 100)})
+    made = recordings_of(source, {"tactile": SKIN}, None, lambda _: None)
     assert [recording.name for recording in made] == ["set-1", "set-2", "set-3"]
     assert len(reads) == 1

@@ -17,7 +17,6 @@ from holdfast.labelling.review.findings import (
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, flat_sensor
-from holdfast.sensors import sensor as built_in
 from holdfast.synthetic import synthetic_recording
 
 
@@ -67,19 +66,6 @@ def test_one_taxel_and_an_odd_rate():
     readings = rng.normal(0, 1, (200, 1, 3))
     kinds = [kind for _, kind, _ in found(Tactile(one, np.arange(200) / 20, readings))]
     assert sorted(kinds) == ["no_contact", "one_taxel", "rate"]
-
-
-def test_turned_taxels_are_named():
-    times = np.arange(600) / 100
-    grip = np.interp(times, [2, 2.4], [0, 1])[:, None, None]
-    normals = np.array([400, -600, 480, -480, 200.0])[:, None] * [0.05, -0.03, 1]
-    noise = np.random.default_rng(0).normal(0, 1, (600, 5, 3))
-    for sign, expected in ((1, "2, 4"), (np.sign(normals[:, 2:]), "")):
-        module = Tactile(built_in("anyskin"), times, 300 + grip * sign * normals + noise)
-        named = [text for _, kind, text in found(module) if kind == "turned"]
-        assert [text.split(" fall")[0] for text in named] == [f"z of taxels {expected}"] * bool(
-            expected
-        )
 
 
 def test_more_taxels_than_a_detector_takes(tmp_path):

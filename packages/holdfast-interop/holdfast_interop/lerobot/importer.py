@@ -17,9 +17,10 @@ from holdfast.errors import RecordingError
 from holdfast.files import check_regular, read_input
 from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
-from holdfast.io.importers.array_conversion import in_memory, recordings_of_arrays
 from holdfast.io.importers.arrays import arrays_of_columns
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
+from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.stored import in_memory
 from holdfast.io.importers.table import natural_order
 from holdfast.io.timed_arrays import (
     TRUTH_TIME,
@@ -98,6 +99,8 @@ def read(
     sensors: Mapping[str, Sensor] | None = None,
     columns: Columns | None = None,
     report: Callable[[str], None] = lambda _: None,
+    *,
+    accept: bool = False,
 ) -> Iterator[Recording]:
     """Yield the recording of each episode.
 
@@ -106,6 +109,7 @@ def read(
         sensors: as in `read_foreign_set`, for a set that holdfast did not write.
         columns: the same.
         report: the same.
+        accept: the same.
 
     Raises:
         RecordingError: the data set is damaged, or no feature fits a sensor.
@@ -116,7 +120,7 @@ def read(
     # Only what holdfast wrote has the headers of recordings; options name columns of any set.
     is_own = bool(files) and HEADER_COLUMN in pq.read_schema(files[0]).names
     if sensors or columns or not is_own:
-        yield from read_foreign_set(path, sensors or {}, columns, report)
+        yield from read_foreign_set(path, sensors or {}, columns, report, accept=accept)
         return
     for episode in read_episodes(path):
         table = _EpisodeTable(episode)
@@ -292,14 +296,17 @@ def read_foreign_set(
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
     report: Callable[[str], None],
+    *,
+    accept: bool,
 ) -> Iterator[Recording]:
     """Yield a recording for each episode of a data set.
 
     Args:
         path: folder of the data set.
-        sensors: as in `recordings_of_arrays`, by the names of features.
+        sensors: as in `recordings_of`, by the names of features.
         columns: the same.
         report: the same.
+        accept: the same.
 
     Raises:
         RecordingError: it is no data set, or no feature fits.
@@ -334,5 +341,6 @@ def read_foreign_set(
             own = replace(own, episode=EPISODE_COLUMN)
         # The other files are like the first: one report for all.
         once = report if number == 0 else lambda _: None
-        for recording in recordings_of_arrays(file, arrays, sensors, own, once):
+        source = Source(file, arrays)
+        for recording in recordings_of(source, sensors, own, once, accept=accept):
             yield replace(recording, name=f"{path.name}{recording.name.removeprefix(file.stem)}")

@@ -5,7 +5,9 @@ import pytest
 
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings
-from holdfast.sensors import sensor
+from holdfast.io.importers.columns import Columns
+from holdfast.io.proposals import ProposalError
+from holdfast.sensors import flat_sensor, sensor
 
 pytest.importorskip("rosbags", reason="rosbags is not installed")
 
@@ -52,7 +54,8 @@ def written(folder, topics, storage="mcap"):
     with BagWriter(folder / "a", storage, "lab", TAXELS) as bag:
         for k in range(N):
             for name, make in topics.items():
-                bag.write(name, make(bag, k), START + k / 100)
+                if (message := make(bag, k)) is not None:
+                    bag.write(name, message, START + k / 100)
     return bag.path
 
 
@@ -82,7 +85,7 @@ def imported(path, keys, **words):
 
 TOPICS = {
     "numbers": (lambda bag, k: numbers(bag, READINGS[k]), "/skin"),
-    "numbers with sizes": (lambda bag, k: numbers(bag, READINGS[k].T, (3, 5)), "/skin"),
+    "numbers with sizes": (lambda bag, k: numbers(bag, READINGS[k], (5, 3)), "/skin"),
     "any topic": (lambda bag, k: numbers(bag, READINGS[k]), "*"),
     "points": (points, "/skin"),
     "taxels": (taxels, "/skin.taxels.f"),
@@ -102,7 +105,7 @@ TOPICS = {
 )
 def test_a_topic_with_numbers(tmp_path, name, storage):
     make, key = TOPICS[name]
-    recording = imported(written(tmp_path, {"/skin": make}, storage), [key])
+    recording = imported(written(tmp_path, {"/skin": make}, storage), [key], accept=key == "*")
     module = recording.modules["finger1"]
     np.testing.assert_array_equal(module.readings, READINGS)
     np.testing.assert_allclose(module.times - START, np.arange(N) / 100, atol=1e-6)
@@ -116,8 +119,40 @@ def test_two_topics_are_two_modules(tmp_path):
     recording = imported(path, ["/l/skin", "/r/skin"])
     assert list(recording.modules) == ["l", "r"]
     np.testing.assert_array_equal(recording.modules["r"].readings, 2 * READINGS)
-    with pytest.raises(RecordingError, match="--topic /l/skin/data=anyskin --topic /r/skin/data="):
+    with pytest.raises(ProposalError) as caught:
         imported(path, ["*"])
+    options = ["--topic", "/l/skin/data=*", "--topic", "/r/skin/data=*"]
+    assert caught.value.proposal.options({}) == options
+
+
+def test_topics_are_not_paired_by_row_number(tmp_path):
+    """One that starts late keeps its times, and one with a message less stays."""
+    path = written(
+        tmp_path,
+        {
+            "/l/skin": points,
+            "/r/skin": lambda bag, k: points(bag, k) if k >= 30 and k != 50 else None,
+        },
+    )
+    modules = imported(path, ["/l/skin", "/r/skin"]).modules
+    assert modules["r"].n_samples == N - 31
+    np.testing.assert_array_equal(modules["r"].readings[0], modules["l"].readings[30])
+    assert modules["r"].times[0] == modules["l"].times[30]
+
+
+def wrench(bag, k):
+    vector = "geometry_msgs/msg/Vector3"
+    parts = [bag.make(vector, x=x, y=y, z=z) for x, y, z in READINGS[k, :2].tolist()]
+    both = bag.make("geometry_msgs/msg/Wrench", force=parts[0], torque=parts[1])
+    return bag.make("geometry_msgs/msg/WrenchStamped", header=header(bag, k), wrench=both)
+
+
+@pytest.mark.parametrize("key", ["*", "/tip", "/tip.wrench.force"])
+def test_of_a_wrench_force_is_read_and_torque_is_not(tmp_path, key):
+    path = written(tmp_path, {"/tip": wrench})
+    button = flat_sensor("button", 1, 1, 0.005, unit="N")
+    (recording,) = import_recordings(path, sensors={key: button}, columns=Columns(unit="N"))
+    np.testing.assert_array_equal(recording.modules["finger1"].readings[:, 0], READINGS[:, 0])
 
 
 NAMED = (("l", 1), ("r", 2))
@@ -134,7 +169,7 @@ def test_times_are_those_of_the_header_if_it_works(tmp_path, late, clock):
 
 REFUSED = {
     "normal force": (lambda bag, k: numbers(bag, READINGS[k, :, 2]), "/skin", "three axes"),
-    "two vectors": (taxels, "/skin", "--topic /skin/taxels/f=anyskin --topic /skin/taxels/p="),
+    "two vectors": (taxels, "/skin", "--topic skin/taxels/f=skin|--topic /skin/taxels/f=/skin"),
     "another topic": (columns, "/hand", "/hand; it has /skin"),
     "no definition": (columns, "/skin", r"lab/Columns \(/skin\).*ros2 bag convert"),
 }

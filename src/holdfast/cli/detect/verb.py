@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,7 @@ from holdfast.cli.options import (
     DetectorOptions,
     JsonOption,
     ModelArgument,
+    PlotOptions,
     SecondsOption,
     SourceArgument,
     StartOptions,
@@ -18,6 +19,12 @@ from holdfast.cli.options import (
 )
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from holdfast.detection import Model
+    from holdfast.recordings import Recording
 
 
 def detect(
@@ -33,6 +40,7 @@ def detect(
     options: DetectorOptions,
     start: StartOptions,
     csv: CsvOptions,
+    figure: PlotOptions,
     seconds: SecondsOption = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -57,15 +65,20 @@ def detect(
       holdfast detect builtin:any xela://auto
       holdfast detect builtin:noise-floor grasp.mcap --summary
       holdfast detect builtin:any press.csv --sensor sensor.json
+      holdfast detect builtin:any grasp.parquet --summary --plot states.png
     """
     from holdfast.cli.detect.estimates import detect_live, detect_recording
     from holdfast.cli.detect.output import print_changes, print_estimates, print_summary
     from holdfast.devices.uri import is_uri
+    from holdfast.io import load_recording
 
     live = is_uri(source)
     if seconds is not None and not live:
         raise ValueError(f"--seconds is for live sources; {source} is a recording")
     check_seconds(seconds)
+    if live and figure.plot is not None:
+        raise ValueError(f"--plot draws one recording; the live source {source} given")
+    figure.check()
     is_csv = csv.fits(source)
     loaded = options.load_model(model)
     if live:
@@ -76,6 +89,7 @@ def detect(
             raise ValueError(f"one recording expected, {len(recordings)} given: {source}")
         recording = recordings[0] if is_csv else None
         chunks = detect_recording(loaded, Path(source), options, start, recording)
+        figure.save(lambda: _drawn(loaded, start.of(recording or load_recording(source))))
         if summary or not (as_json and sys.stdout.isatty()):  # lines on the screen need no bar
             chunks = progress(chunks, "detecting")
     shows_changes = sys.stdout.isatty() and not as_json
@@ -87,3 +101,11 @@ def detect(
         print_changes(chunks, live=live)
     else:
         print_estimates(chunks, live=live)
+
+
+def _drawn(model: "Model", recording: "Recording") -> "Figure":
+    """Return a figure of the force of each finger over time, on the colours of its states."""
+    from holdfast.detection import detect as detect_whole
+    from holdfast.plots.detection import figure_of_detection
+
+    return figure_of_detection(detect_whole(model, recording))

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from holdfast.cli.csv_options import refuse_foreign
 from holdfast.cli.info.text import print_folder, print_model, print_recording
 from holdfast.cli.options import JsonOption, PlotOptions, TareOption
 from holdfast.cli.terminal.console import print_error, print_json
@@ -66,6 +67,7 @@ def info(
     elif kind == "folder":
         show_folder(path, Tare.parse(tare), as_json=as_json)
     else:
+        refuse_foreign([path])
         show_recording(path, figure, Tare.parse(tare), model, as_json=as_json)
 
 

@@ -5,6 +5,7 @@ from contextlib import suppress
 from threading import Thread
 from typing import Annotated
 
+from holdfast.cli.csv_options import refuse_foreign
 from holdfast.cli.label.inputs import (
     AuthorOption,
     PathsArgument,
@@ -62,6 +63,7 @@ def label(
     from holdfast.web.guard import Guard
     from holdfast.web.server import open_browser, page_url, run_server
 
+    refuse_foreign(paths)
     token = access.find_token()
     guard = Guard(access.host, token)
     files = recordings_at(paths)

@@ -15,7 +15,7 @@ from typing import Any
 from holdfast.errors import RecordingError, missing_part, require_extras
 from holdfast.files import check_regular, is_lfs_pointer, refusal_of_lfs_pointer
 from holdfast.io.foreign import read_foreign, read_foreign_poses
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
 from holdfast.io.importers.table import SLIPPED, csv_files, name_prefixes
 from holdfast.io.safe_reading import recording_errors
 from holdfast.plugins import PluginGroup
@@ -30,12 +30,14 @@ FORMATS = {
 }
 """Formats that can be imported, with a description; they are detected in this order, those of
 plug-ins after the first."""
+BAG_SUFFIXES = (".bag", ".db3", ".mcap")
+ZARR_MARKS = (".zgroup", ".zarray", "zarr.json")
 IN_CONTACT = "the object is held from the first sample on (metadata: starts_loaded)"
 IF_IN_CONTACT = (
     "if the hand already holds the object at the first sample, use `holdfast detect --in-contact`, "
     "and so in other verbs"
 )
-IF_Z_FALLS = f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --columns signs=+--"
+IF_Z_FALLS = f"{IF_IN_CONTACT}; if z falls when a taxel is pressed, give --axes 1,-2,-3"
 HINTS = {"xela-log": IF_IN_CONTACT, "csv": IF_Z_FALLS, "arrays": IF_Z_FALLS}
 """Advice about the recordings of a format, for the person who imports them. Options are those of
 `import`, unless another verb is named."""
@@ -50,6 +52,7 @@ def import_recordings(
     columns: Columns | str | None = None,
     report: Callable[[str], None] = lambda _: None,
     limited: bool = True,
+    accept: bool = False,
 ) -> Iterator[Recording]:
     """Import the recordings in a file or folder of another format, one at a time.
 
@@ -59,19 +62,19 @@ def import_recordings(
         labels: keep the labels in the data.
         sensors: sensor by module, or of `"*"` for all modules, of a CSV file of any logger; by
             array of another file, or by topic of a bag.
-        columns: columns of such a file, as `Columns` or as its text; what is not given is
-            guessed from the header. With `sensors` or `columns` the format is one of those that
-            take them (`takes_sensors`).
-        report: receives a text about columns that were guessed.
+        columns: layout of such a file, as `Columns` or as the text of `--columns`. With `sensors`
+            or `columns` the format is one of those that take them (`takes_sensors`).
+        report: receives a text about what was read.
         limited: refuse a file that takes more than 1 GiB of memory, or 120 s of the processor for
             one recording, to read; False for large files of your own.
+        accept: take the layout that is proposed for a file that does not say it.
 
     Yields:
         Recordings; each is read when the iterator reaches it.
 
     Raises:
         RecordingError: `path` does not exist, no format fits, or the data contradict the
-            format.
+            format. A `ProposalError` has the options that say a layout.
         MissingExtra: the format needs a package that is not installed.
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
             `columns` are given for a format that does not take them.
@@ -91,7 +94,10 @@ def import_recordings(
             for part, prefix in parts.items():
                 if not part.is_dir():
                     check_regular(part)
-                for found in read_foreign(part, name, sensors, given, report, limited=limited):
+                reader = read_foreign(
+                    part, name, sensors, given, report, limited=limited, accept=accept
+                )
+                for found in reader:
                     recording = replace(found, name=f"{prefix}{found.name}") if prefix else found
                     if labels:
                         yield recording
@@ -174,6 +180,7 @@ def _format_of(
         raise ValueError(f"--sensor and --columns belong to the format csv; {name!r} given")
     if not path.exists():
         raise RecordingError(f"{path} does not exist; a file or folder to import expected")
+    _refuse_missing(path)
     with recording_errors(path):
         if not path.is_dir():
             check_regular(path)
@@ -190,12 +197,29 @@ def _format_of(
             return "csv"
         loaded = {plugin: IMPORTER_PLUGINS.load(plugin) for plugin in IMPORTER_PLUGINS.names()}
         loaded["arrays"] = importer("arrays")
-        fitting = (
-            known
-            for known, source in loaded.items()
-            if source is not None and takes_sensors(known) and source.can_read(path)
+        for known, source in loaded.items():
+            if source is not None and takes_sensors(known) and source.can_read(path):
+                return known
+        return "csv"
+
+
+def _refuse_missing(path: Path) -> None:
+    """Refuse a file whose format needs a package that is not installed, or another program.
+
+    Raises:
+        HoldfastError: it is such a file.
+    """
+    name = "rosbag" if path.suffix in BAG_SUFFIXES or (path / "metadata.yaml").is_file() else ""
+    name = "lerobot" if (path / "meta" / "info.json").is_file() else name
+    missing = missing_part("importers", name, f"the format {name}")
+    if missing and name not in IMPORTER_PLUGINS.names():
+        raise missing
+    if any((path / mark).is_file() for mark in ZARR_MARKS):
+        values = f"zarr.open({str(path)!r})['data/tactile'][:]"
+        raise RecordingError(
+            f"{path} is a zarr folder, which is not read: write its arrays in Python, as "
+            f"numpy.savez({path.stem + '.npz'!r}, tactile={values}, time=...), then import that"
         )
-        return next(fitting, "csv")
 
 
 def takes_sensors(name: str) -> bool:

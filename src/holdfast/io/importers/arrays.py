@@ -14,14 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError, require_extras
-from holdfast.io.importers.array_conversion import (
-    StoredArray,
-    StoredArrays,
-    arrays_of_records,
-    in_memory,
-    recordings_of_arrays,
-)
-from holdfast.io.importers.csv_columns import Columns
+from holdfast.io.importers.columns import Columns
+from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.stored import StoredArray, StoredArrays, arrays_of_records, in_memory
 from holdfast.io.importers.table import csv_files, natural_order
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
@@ -60,8 +55,10 @@ def read(
     sensors: Mapping[str, Sensor] | None = None,
     columns: Columns | None = None,
     report: Callable[[str], None] = lambda _: None,
+    *,
+    accept: bool = False,
 ) -> Iterator[Recording]:
-    """Yield the recordings in a file with arrays; see `recordings_of_arrays`.
+    """Yield the recordings in a file with arrays; see `recordings_of`.
 
     Raises:
         RecordingError: it cannot be read, or has no such array.
@@ -74,7 +71,7 @@ def read(
         if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
             refuse_pickle(path)
         raise
-    return recordings_of_arrays(path, arrays, sensors or {}, columns, report)
+    yield from recordings_of(Source(path, arrays), sensors or {}, columns, report, accept=accept)
 
 
 def _files(path: Path) -> list[Path]:

@@ -2,19 +2,22 @@
 
 import codecs
 import csv
+import itertools
 import re
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple, TextIO
+from typing import Any, NamedTuple, TextIO
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.errors import RecordingError
 from holdfast.files import check_regular
+from holdfast.io.importers.stored import StoredArray
 from holdfast.sensors.types import Array
 
 MAX_CELL_LENGTH = 1 << 20
@@ -23,6 +26,10 @@ MAX_HEAD_SIZE = 1 << 20
 """Maximum size of all lines before the first row [characters]."""
 MAX_SHOWN_LENGTH = 80
 """Length from which on names of columns are left out of a message [characters]."""
+MIN_CELLS = 4
+"""Minimum number of cells of a header that a block of other lines precedes."""
+MAX_BLOCK = 100
+"""Maximum number of lines before such a header."""
 SEPARATORS = ",;\t| "
 """Characters between the cells of a row, of which a file has one; any number of blanks is one."""
 SLIPPED = "slipped"
@@ -35,6 +42,8 @@ _ENCODING_SIZE = 1 << 16
 """Size of the start of a file that decides its encoding [bytes]."""
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f]")
 _NUMBER = re.compile(r"[-+]?\d+(\.\d*)?([eE][-+]?\d+)?")
+_THOUSANDS = re.compile(r"-?\d{1,3}([.,]\d{3})+")
+_GROUPED = re.compile(r"-?\d{1,3}(,\d{3})+(\.\d*)?")
 _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 """Characters with which Python reads numbers that no other program writes, such as `1_000`."""
 
@@ -50,6 +59,7 @@ class TableHead(NamedTuple):
         encoding: of the text.
         named: whether the names are those of a header.
         first_row: cells of the first row.
+        n_skipped: number of lines before the header that are another table.
     """
 
     comments: tuple[str, ...]
@@ -59,6 +69,7 @@ class TableHead(NamedTuple):
     encoding: str
     named: bool
     first_row: tuple[str, ...]
+    n_skipped: int = 0
 
 
 class Table(NamedTuple):
@@ -106,7 +117,12 @@ def header_line(path: Path) -> tuple[str, ...]:
 
 
 def read_table(
-    path: Path, text: Sequence[str] = (), head: TableHead | None = None
+    path: Path,
+    text: Sequence[str] = (),
+    head: TableHead | None = None,
+    *,
+    decimal: str | None = None,
+    wrong: dict[str, str] | None = None,
 ) -> tuple[Table, dict[str, list[str]]]:
     """Read the numbers of a CSV file, and the cells of its columns of text.
 
@@ -117,6 +133,9 @@ def read_table(
         path: path of the file.
         text: names of the columns of text; they are NaN among the numbers.
         head: what `read_head` returned, if it is known.
+        decimal: `comma` or `point`; the other one separates thousands.
+        wrong: receives the first cell of each column that is no number, and under an empty name a
+            last row that is cut; None to raise an error for them.
 
     Raises:
         RecordingError: the file cannot be read, is empty, has rows of different lengths, a cell
@@ -126,19 +145,28 @@ def read_table(
     names, first_line, separator = head.names, head.first_line, head.separator
     cells: dict[int, list[str]] = {names.index(name): [] for name in text if name in names}
     numbers = array("d")
-    points = _DecimalPoints(path, separator)
+    marks = _DecimalMarks(path, separator, decimal)
+    uneven = ""
     try:
         with _long_cells():
             rows = csv.reader(_lines(path, head), delimiter=separator)
             for number, row in enumerate(rows, start=first_line):
-                if row:
-                    numbers.extend(_numbers(path, number, names, row, cells, points))
+                if row and (uneven or len(row) != len(names)):
+                    problem = f"{len(row)} cells given, {len(names)} expected as in the header"
+                    uneven = uneven or f"{path}, row {number}: {problem}"
+                    if wrong is None or len(row) > len(names) or "" in wrong:
+                        raise RecordingError(uneven)
+                    wrong[""] = f"the last row, {number}, is cut and left out: {problem}"
+                elif row:
+                    numbers.extend(_numbers(path, number, names, row, cells, marks, wrong))
     except OSError as cause:
         raise RecordingError(f"cannot read {path}: {cause.strerror or cause}") from cause
     except (UnicodeError, csv.Error) as cause:
         raise RecordingError(f"{path} is not a table of numbers: {_text(cause)}") from cause
     if not numbers:
         raise RecordingError(f"{path} has a header but no samples; at least one expected")
+    if wrong is not None:
+        marks.check()
     values = np.frombuffer(numbers).reshape(-1, len(names))
     return (
         Table(path, names, values, first_line, head.comments),
@@ -146,18 +174,22 @@ def read_table(
     )
 
 
-class _DecimalPoints:
+class _DecimalMarks:
     """Conversion of decimal commas to points; a file has only one of the two.
 
     Args:
         path: path of the file.
         separator: between cells; with commas there is no decimal comma.
+        decimal: `comma` or `point`, if the user says it: the other one separates thousands.
     """
 
-    def __init__(self, path: Path, separator: str) -> None:
+    def __init__(self, path: Path, separator: str, decimal: str | None) -> None:
         self._path = path
-        self._used = ""
-        self._converts = separator != ","
+        self._used = {"comma": ",", "point": "."}.get(decimal or "", "")
+        self._thousands = {"comma": ".", "point": ","}.get(decimal or "", "")
+        self._converts = separator != "," or bool(decimal)
+        # Cells such as 1.451 beside 946, and no others, may have points between thousands.
+        self._n_grouped, self._n_plain, self._is_clear = 0, 0, bool(decimal) or separator == ","
 
     def converted(self, number: int, row: list[str]) -> list[str]:
         """Return a row of numbers without decimal commas.
@@ -167,15 +199,42 @@ class _DecimalPoints:
         """
         if not self._converts:
             return row
+        if self._thousands:
+            row = [cell.replace(self._thousands, "") for cell in row]
         text = "".join(row)
         used = {mark for mark in ",." if mark in text} | {self._used} - {""}
         if len(used) > 1:
             raise RecordingError(
-                f"{self._path}, row {number}: numbers with a decimal comma and with a decimal "
-                "point given; one of the two expected in the whole file"
+                f"{self._path}, row {number}: numbers with a comma and with a point given: give "
+                "--columns decimal=comma, or decimal=point, if the other one separates thousands"
             )
         self._used = "".join(used)
+        if not self._is_clear:
+            self._look(row)
         return [cell.replace(",", ".", 1) for cell in row] if self._used == "," else row
+
+    def _look(self, row: list[str]) -> None:
+        marked = [cell for cell in row if self._used and self._used in cell]
+        plain = [cell.strip("-") for cell in row if cell not in marked and cell.strip()]
+        grouped = sum(map(bool, map(_THOUSANDS.fullmatch, marked)))
+        self._is_clear = grouped < len(marked) or any(len(cell) > 3 for cell in plain)
+        self._n_grouped += grouped
+        self._n_plain += len(plain)
+
+    def check(self) -> None:
+        """Check at the end that no number can have a mark between thousands.
+
+        Raises:
+            RecordingError: all have.
+        """
+        # One column of whole numbers beside others with three decimals is no doubt.
+        if not self._is_clear and self._n_grouped and self._n_plain > 0.2 * self._n_grouped:
+            name = "comma" if self._used == "." else "point"
+            other = "point" if name == "comma" else "comma"
+            raise RecordingError(
+                f"{self._path}: numbers such as 1{self._used}451 beside whole numbers below 1000 "
+                f"given: give --columns decimal={name} if these are thousands, else decimal={other}"
+            )
 
 
 def _numbers(
@@ -184,23 +243,22 @@ def _numbers(
     names: Sequence[str],
     row: list[str],
     cells: dict[int, list[str]],
-    points: _DecimalPoints,
+    marks: _DecimalMarks,
+    wrong: dict[str, str] | None,
 ) -> list[float]:
     """Return the numbers of a row; NaN for empty cells and text, which is appended to `cells`.
 
+    The first wrong cell of each column goes to `wrong`; without it, it is an error.
+
     Raises:
-        RecordingError: the row has another length, or a cell that is not a number.
+        RecordingError: a cell is not a number.
         UnicodeError: a cell of text is not UTF-8.
     """
-    if len(row) != len(names):
-        raise RecordingError(
-            f"{path}, row {number}: {len(row)} cells given, {len(names)} expected as in the header"
-        )
     for index, column in cells.items():
         row[index].encode()
         column.append(row[index])
         row[index] = ""
-    row = points.converted(number, row)
+    row = marks.converted(number, row)
     if not _OTHER_FORMS.search("".join(row)):
         with suppress(ValueError):  # a cell is empty or wrong
             return list(map(float, row))
@@ -212,9 +270,13 @@ def _numbers(
             with suppress(ValueError):
                 value = float(cell or "nan")
         if value is None:
-            raise RecordingError(
-                f"{path}, row {number}, column {name!r}: {_start(cell)} given, a number expected"
-            )
+            text = f"{path}, row {number}, column {name!r}: {_start(cell)} given, a number expected"
+            if _GROUPED.fullmatch(cell.strip()):
+                text += "; --columns decimal=point if the comma separates thousands"
+            if wrong is None:
+                raise RecordingError(text)
+            wrong.setdefault(name, text)
+            value = np.nan
         numbers.append(value)
     return numbers
 
@@ -345,12 +407,13 @@ def read_head(path: Path) -> TableHead:
                 elif number == 1 and (given := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))):
                     separators = given["separator"]
                 elif line.strip():
-                    following = file.readline(MAX_HEAD_SIZE)
-                    names, separator = _names(line.rstrip("\r\n"), following, separators)
-                    if not _is_sample(names, separator):
-                        row = _cells(following, separator)
+                    lines = [line, file.readline(MAX_HEAD_SIZE)]
+                    names, separator, n = _header(lines, file, separators)
+                    if n or not _is_sample(names, separator):
+                        row, first = _cells(lines[n + 1], separator), number + n + 1
+                        n_skipped = first - 2 if n else 0
                         return TableHead(
-                            tuple(comments), names, number + 1, separator, encoding, True, row
+                            tuple(comments), names, first, separator, encoding, True, row, n_skipped
                         )
                     numbered = tuple(f"column{k + 1}" for k in range(len(names)))
                     title = _cells(comments[-1], separator) if comments else ()
@@ -366,6 +429,70 @@ def read_head(path: Path) -> TableHead:
     except (UnicodeError, csv.Error) as cause:
         raise RecordingError(f"{path} is not CSV text: {_text(cause)}") from cause
     raise RecordingError(f"{path} is empty; a header line and samples expected")
+
+
+def _header(lines: list[str], file: TextIO, separators: str) -> tuple[tuple[str, ...], str, int]:
+    """Return the names in the header, the separator, and the index of the header among the lines.
+
+    A block of lines of a few cells, such as a description of the session, may precede it.
+
+    Args:
+        lines: the first two; those that are read more are appended.
+        file: has the others.
+        separators: that may be between cells.
+    """
+    names, separator = _names(lines[0].rstrip("\r\n"), lines[1], separators)
+    if len(names) < MIN_CELLS or len(_cells(lines[1], separator)) < len(names):
+        lines += islice(iter(lambda: file.readline(MAX_HEAD_SIZE), ""), MAX_BLOCK)
+        for n, (line, after) in enumerate(itertools.pairwise(lines)):
+            titles, mark = _names(line.rstrip("\r\n"), after, separators)
+            is_table = len(titles) == len(_cells(after, mark)) >= MIN_CELLS
+            if n and is_table and len(titles) > 2 * len(names):
+                return titles, mark, n
+    return names, separator, 0
+
+
+def columns_of_table(
+    path: Path, decimal: str | None = None, text: Collection[str] = ()
+) -> tuple[dict[str, StoredArray], TableHead, list[str]]:
+    """Return the columns of a CSV file, what is before them, and lines about what was left out.
+
+    A column is text if its first cell is. A cell that is no number is an error if its column is
+    read.
+
+    Args:
+        path: path of the file.
+        decimal: as in `read_table`.
+        text: names of columns of text.
+
+    Raises:
+        RecordingError: as `read_table`, or two columns have one name.
+    """
+    head = read_head(path)
+    if doubled := [name for name, n in Counter(head.names).items() if n > 1 and name]:
+        raise RecordingError(f"two columns are named {doubled[0]!r}; one name for each expected")
+    firsts = dict(zip(head.names, head.first_row, strict=False))
+    words = [name for name, cell in firsts.items() if name in text or _is_text(cell)]
+    wrong: dict[str, str] = {}
+    table, cells = read_table(path, words, head, decimal=decimal, wrong=wrong)
+    arrays = {}
+    for k, name in enumerate(head.names):
+        values = np.array(cells[name]) if name in cells else table.values[:, k]
+
+        def read(name: str = name, values: npt.NDArray[Any] = values) -> npt.NDArray[Any]:
+            if name in wrong:
+                raise RecordingError(wrong[name])
+            return values
+
+        arrays[name] = StoredArray(values.shape, values.dtype.kind, read)
+    n = head.n_skipped
+    notes = [f"{n} lines before the header are left out"] if n else []
+    return arrays, head, notes + ([wrong[""]] if "" in wrong else [])
+
+
+def _is_text(cell: str) -> bool:
+    number = cell.replace(",", "").replace(".", "")
+    return bool(cell) and not _NUMBER.fullmatch(number) and number.lower() not in ("nan", "inf")
 
 
 def _encoding(path: Path) -> str:

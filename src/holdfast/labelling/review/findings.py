@@ -26,14 +26,20 @@ CONSTANT_SECONDS = 0.5
 AXES = "xyz"
 INVALID_SHARE = 0.002
 """Share of samples with an invalid reading above which a person should see it."""
-MAX_TAXEL_FORCE = 100.0
-"""Force on one taxel above which the unit of the readings is in doubt [N]."""
 
 FindingKind = Literal[
     "constant",
     "dead",
     "axes",
     "unit",
+    "sentinel",
+    "zeros",
+    "unsigned",
+    "wraps",
+    "gravity",
+    "angle",
+    "norm",
+    "turned",
     "one_taxel",
     "many_taxels",
     "rate",
@@ -49,7 +55,6 @@ FindingKind = Literal[
     "held",
     "invalid",
     "stuck",
-    "turned",
 ]
 
 
@@ -96,11 +101,6 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
         text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
         return [*found, Finding("", "starts_loaded", text)]
-    found += [
-        Finding(name, "turned", _turned_text((module.turned + 1).tolist()))
-        for name, module in scan.modules.items()
-        if module.turned is not None and module.turned.size
-    ]
     with suppress(HoldfastError):  # no sample for the tare
         if not hand_force(scan.recording).n_touching.any():
             text = "no finger is in contact in the whole recording"
@@ -173,14 +173,6 @@ def report_hidden_labels(paths: Sequence[Path], report: Callable[[str], None]) -
         )
 
 
-def _turned_text(taxels: Sequence[int]) -> str:
-    return (
-        f"z of taxel{'s' if len(taxels) > 1 else ''} {', '.join(map(str, taxels))} falls in the "
-        "first touch while that of others rises: magnets of alternating poles? builtin:any finds "
-        "contact by all taxels; turn them in the sensor file (rotations)"
-    )
-
-
 def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
     low, high = RELATIVE_RATES
     rate = module.force.rate / module.rows_per_update
@@ -212,15 +204,8 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
         if long[0][0] <= times[0]:  # the threshold of contact comes from the noise of the tare
             text += ": the tare shows no noise; give train a --contact-threshold"
         yield "constant", text
-    # Readings that cannot be counts, or hardly newtons.
-    least, most, unit = module.lowest, module.highest, module.sensor.unit
-    largest = max(abs(least), abs(most))
-    if unit == "count" and most - least < 1:
-        text = f"readings between {least:.4g} and {most:.4g} are less than one count apart, and so "
-        text += "taken for noise: is their unit N? (--unit N of holdfast sensors --template)"
-        yield "unit", text
-    if unit == "N" and largest > MAX_TAXEL_FORCE:
-        yield "unit", f"readings up to {largest:.4g} N on a taxel: is their unit count?"
+    for finding in module.layout:
+        yield finding.kind, finding.advice
 
 
 MAX_RATE_RATIO = 5.0
@@ -231,8 +216,9 @@ MAX_GAPS_SHOWN = 2
 DRIFT_KEY = "clock_drift"
 """Field of the metadata of a bag: how much faster the bag's clock runs than the device's."""
 _ORDER: tuple[FindingKind, ...] = (
-    "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel", "turned",
+    "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "sentinel", "zeros", "unsigned",
+    "wraps", "gravity", "angle", "norm", "turned", "starts_loaded", "axes", "gaps",
+    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel",
     "many_taxels", "no_contact", "no_labels",
 )  # fmt: skip
 

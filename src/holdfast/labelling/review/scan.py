@@ -6,48 +6,18 @@ from functools import cached_property
 import numpy as np
 
 from holdfast.detection.plan import first_finite
+from holdfast.io.importers.layout_findings import LayoutFinding, layout_findings
 from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.fingertip_forces import force_sensor
 from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import HELD_ROWS, held_rows
-from holdfast.sensors.types import Array, Flags, Integers, Sensor
+from holdfast.sensors.types import Array, Flags
 
+LAYOUT_SAMPLES = 20_000
+"""Number of samples at the beginning that the findings about the layout are based on."""
 SCAN_BLOCK_SAMPLES = 4096
 """Samples that are compared and summed at a time: bounds the memory."""
-TOUCH_OF_NOISE = 100.0
-"""Load of the taxels in a first touch, at least, in their noise; as in kernel/contact.c."""
-TURNED_SHARE = 0.2
-"""Least share of the squared normal readings that rise, and that fall; as in kernel/contact.c."""
-
-
-def turned_taxels(readings: Array, sensor: Sensor) -> Integers | None:
-    """Return the taxels of which the normal reading falls in the first touch.
-
-    Only of a sensor whose force vanishes thereby: else there are none.
-
-    Args:
-        readings: (n, n_taxels, 3) beyond those without contact [unit of the sensor].
-        sensor: of the module.
-
-    Returns:
-        Their indices; None without a touch.
-    """
-    load = np.sqrt((readings**2).sum(axis=(1, 2)))
-    steps = (np.diff(readings, axis=0) ** 2).sum(axis=(1, 2))
-    steps = steps[np.isfinite(steps) & (steps > 0)]
-    if not steps.size:
-        return None
-    touches = np.flatnonzero(load > TOUCH_OF_NOISE * np.sqrt(np.median(steps) / 2))
-    if not touches.size:
-        return None
-    forces = np.einsum("ijk,ik->ij", sensor.rotations, readings[touches[0]])
-    normals = forces @ sensor.normal
-    squares, fallen = (normals**2).sum(), (normals[normals < 0] ** 2).sum()
-    differ = min(fallen, squares - fallen) >= TURNED_SHARE * squares
-    vanishes = (forces.sum(axis=0) ** 2).sum() < (forces**2).sum()
-    is_turned = (normals < 0) & (normals**2 > squares / (100 * len(normals)))
-    return np.flatnonzero(is_turned & bool(differ and vanishes))
 
 
 class ModuleScan:
@@ -63,7 +33,7 @@ class ModuleScan:
         lowest: of all readings [unit of the readings].
         highest: of all readings [unit of the readings].
         rows_per_update: rows in which each sample comes, in the first part; 1 if in one.
-        turned: taxels that fall in the first touch while others rise as much; None before it.
+        layout: findings about the layout of the readings, in the first part.
     """
 
     def __init__(self, module: Tactile) -> None:
@@ -72,7 +42,7 @@ class ModuleScan:
         self.still: Flags = np.ones(3, dtype=np.bool_)
         self.lowest, self.highest = np.inf, -np.inf
         self.rows_per_update = 1.0
-        self.turned: Integers | None = None
+        self.layout: list[LayoutFinding] = []
         # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
         # of its times, and its last sample. The first finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
@@ -97,6 +67,8 @@ class ModuleScan:
             if not self._last.size:
                 readings = module.readings[:HELD_ROWS]
                 self.rows_per_update = held_rows(readings, module.sensor, module.rate) or 1.0
+                readings = module.readings[:LAYOUT_SAMPLES]
+                self.layout = layout_findings(readings, module.sensor, module.unit)
             self._times.append(module.times)
             self._end = float(module.times[-1])
         for first in range(0, module.n_samples, SCAN_BLOCK_SAMPLES):
@@ -115,8 +87,6 @@ class ModuleScan:
             force = np.empty((len(values), 3))
             fill_fingertip_force(values, self._zero, self.sensor.rotations, force)
             self._forces.append(force)
-            if self.turned is None:
-                self.turned = turned_taxels(values - self._zero, self.sensor)
 
     @cached_property
     def repeats(self) -> Flags:
