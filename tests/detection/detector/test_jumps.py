@@ -95,9 +95,11 @@ def test_a_reading_that_wraps_in_the_press_masks_its_taxel(model):
 def test_the_first_touch_of_one_taxel_is_no_fault_that_lasts(skin, seconds):
     which = sensor(skin)
     scale = 1.0 if which.unit == "count" else (which.step or 0.004) / 2
-    rng, zero = np.random.default_rng(1), 30_000.0 if which.range and not which.step else 0.0
+    at_zero = which.step or which.rests_at_zero or not which.range
+    rng, zero = np.random.default_rng(1), 0.0 if at_zero else 30_000.0
+    press = min(300 * scale, 0.5 * (which.range or (0, np.inf))[1])
     readings = zero + scale * rng.normal(size=(1000, which.n_taxels, 3))
-    readings[:, 0, 2] += 300 * scale * np.clip((TIMES - 2) / max(seconds, 1e-3), 0, 1)
+    readings[:, 0, 2] += press * np.clip((TIMES - 2) / max(seconds, 1e-3), 0, 1)
     if which.step:
         readings = which.step * np.round(readings / which.step)
     assert not traced(which, readings, "builtin:any").faults[203:].any()
