@@ -200,7 +200,8 @@ def walk(sensor, seed, n=400, rate=RATE, uneven=0.0, gaps=()):
     for k, periods in gaps:
         steps[k] = periods
     shape = (n, sensor.n_taxels, 3)
-    load = np.clip((np.arange(n) - 60) / 30, 0, 1) * (np.arange(n) < n - 40)
+    # Released over some samples: a load that goes at once is a new baseline.
+    load = np.clip(np.minimum((np.arange(n) - 60) / 30, (n - 40 - np.arange(n)) / 10), 0, 1)
     moving = np.cumsum(rng.normal(size=shape), axis=0) * 0.02
     # Mostly shear, so that the ratios reach their bound; and by less than a step at a time.
     push = np.array([9, 0, 1] if sensor.name == "papillarray" else [0, 0, 1])
