@@ -132,6 +132,8 @@ def test_features_that_compare_taxels_need_two():
     assert hand_model.blind_features("thumb", sensor(1)) == (
         "second_shared", "second_own", "second_top",
         "mean_second_shared", "mean_second_own", "mean_second_top",
+        "centre_shift", "divergence", "relative_divergence",
+        "fast_own", "fast_own_30ms", "fast_own_100ms", "fast_own_400ms",
     )  # fmt: skip
     assert Model(fingers={ANY_FINGER: part}).blind_features("thumb", sensor(1)) == ()
 

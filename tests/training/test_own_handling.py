@@ -16,6 +16,7 @@ from holdfast.training.own_handling import (
     MIN_SCALE,
     HandlingKey,
     OwnHandling,
+    check_shear,
     grasped_durations,
     grasped_samples,
     location_and_scale,
@@ -206,3 +207,19 @@ def test_faults_are_refused():
     broken = Recording("broken", {"thumb": Tactile(PAD, module.times, readings)})
     with pytest.raises(TrainingError, match=r"thumb: .*not_finite"):
         handling_of(broken).check()
+
+
+@pytest.mark.parametrize(("axes", "refused"), [((0, 1), True), ((0,), False), ((0, 1, 2), False)])
+def test_a_sensor_of_normal_force_is_refused_by_name(axes, refused):
+    made = handling_recording(1)
+    modules = {}
+    for name, module in made.modules.items():
+        readings = module.readings.copy()
+        readings[..., list(axes)] = 100
+        modules[name] = replace(module, readings=readings)
+    made = replace(made, modules=modules)
+    if refused:
+        with pytest.raises(TrainingError, match=f"{next(iter(modules))}: normal force alone of pad"):
+            check_shear(made)
+    else:
+        check_shear(made)

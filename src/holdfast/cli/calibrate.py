@@ -15,6 +15,7 @@ from holdfast.cli.options import (
     check_seconds,
     check_source,
     check_speed,
+    report_too_few_taxels,
 )
 from holdfast.cli.terminal.console import (
     print_json,
@@ -103,6 +104,8 @@ def calibrate(
                 stream, duration, speed, lambda: stop.requested, print_message
             )
     recordings = [recorded] if recorded is not None else start.load_dataset(data)
+    if recorded is None:
+        report_too_few_taxels(loaded, recordings)
     calibrated = calibrate_with_report(
         loaded, recordings, false_alarms=false_alarms, progress=lambda x: progress(x, "reading")
     )

@@ -401,6 +401,12 @@ def report_blind_features(model: "Model", sensors: Mapping[str, "Sensor"]) -> No
             )
 
 
+def report_too_few_taxels(model: "Model", recordings: "Sequence[Recording]") -> None:
+    """Print the features that sensors of the first recording lack, as `report_blind_features`."""
+    sensors = {name: module.sensor for name, module in recordings[0].modules.items()}
+    report_blind_features(model, model.fingers_of(sensors))
+
+
 def report_missing_slip_rules(model: "Model") -> None:
     """Print that the slip probability of a model, or of some of its fingers, is always null."""
     without = [name for name, part in model.fingers.items() if part.slip is None]

@@ -18,7 +18,7 @@ from holdfast.cli.scores import (
     print_verdict,
     warn_about_recordings,
 )
-from holdfast.cli.terminal.console import print_json, print_line
+from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.errors import require_extras
 
@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from holdfast.recordings import Recording
+
+ANSWERS = {"stable": "STABLE", "slip": "a slip", "slip_changes": "a slip, begun in contact,"}
 
 
 def tune(
@@ -56,7 +58,7 @@ def tune(
     events. Tare, contact, hysteresis and hold time stay, and count. Use recordings that the model
     was not trained on: the rate is a promise for similar grasps only.
 
-    With --for slip, it is the threshold of the slip rule, by the false alarms and slips of single
+    With --for slip, it is the threshold of each slip rule, by the false alarms and slips of single
     fingers; a slip is reported in at most 2 % of quiet hold. The recordings need a truth, or
     labels with the cause slip.
 
@@ -91,14 +93,18 @@ def tune(
         print_json({**head, **tuned.document(), "trained_on": evaluation.trained_on})
         return
     print_verdict(evaluation.verdict or no_verdict(len(evaluation.trained_on), n))
-    chosen, before = tuned.chosen, tuned.before
-    # By threshold: the one of before may be among those that were tried.
-    points = {point.threshold: point for point in (*tuned.points, before)}
-    notes = {before.threshold: "before", chosen.threshold: "chosen"}
-    print_points([points[t] for t in sorted(points)], notes)
-    print_line()
-    answer = "STABLE" if chosen.slips is None else "a slip"
-    print_line(
-        f"{out}: {answer} from a probability of {chosen.threshold:.3g} on, was "
-        f"{before.threshold:.3g}"
-    )
+    for part in (tuned, tuned.changes):
+        if part is None:
+            continue
+        chosen, before = part.chosen, part.before
+        # By threshold: the one of before may be among those that were tried.
+        points = {point.threshold: point for point in (*part.points, before)}
+        notes = {before.threshold: "before", chosen.threshold: "chosen"}
+        print_points([points[t] for t in sorted(points)], notes)
+        print_line()
+        print_line(
+            f"{out}: {ANSWERS[part.head]} from a probability of {chosen.threshold:.3g} on, was "
+            f"{before.threshold:.3g}"
+        )
+    if tuned.other_head:
+        print_message(tuned.other_head)

@@ -69,46 +69,87 @@ static hf_real hf_smoothed(hf_real mean, hf_real value, hf_real step, hf_real se
     return isnan(mean) ? value : mean + step / (step + seconds) * (value - mean);
 }
 
-/* Sums over the taxels of a sample. */
-typedef struct {
-    hf_real load;      /* sum |N_i| */
-    hf_real centre[3]; /* sum |N_i| r_i */
-    hf_real friction;  /* sum |N_i| min(|T_i| / max(|N_i|, 5 s), 5) */
-} hf_slide_sums;
+/* Return the kinds of sliding that some lag needs. */
+static inline uint64_t hf_kinds_of_sliding(const holdfast_hand *hand)
+{
+    uint64_t kinds = 0;
+    for (size_t i = 0; i < HF_N_LAGS(hand); ++i) {
+        kinds |= hand->lags[i].sliding;
+    }
+    return kinds;
+}
 
-/* Store y_i, |N_i|, and the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0), and add up. */
-static hf_slide_sums hf_sum_slide(const hf_finger *f, size_t now, hf_real s)
+/* Store y_i and |N_i|; return sum |N_i|. */
+static hf_real hf_store_slide(const hf_finger *f, size_t now)
 {
     const size_t n = f->n;
-    const hf_real band = HF_SHARE_NOISE * s;
     hf_real *const own = hf_slide_at(f, now), *const shares = f->shares;
-    const hf_wide none = {0}, least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
-    hf_parts load = hf_no_parts(), cx = load, cy = load, cz = load, friction = load;
+    hf_parts load = hf_no_parts();
     for (size_t i = 0; i < n;) {
         for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_vectors v =
                 hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
-            const hf_vectors r = hf_load_vectors(f->positions, n, i);
             const hf_wide pressed = hf_wide_abs(v.z - hf_load(shares + 3 * n + i));
-            const hf_wide shear = hf_root(v.x * v.x + v.y * v.y);
-            const hf_wide low = hf_greater(shear - band, none), high = shear + band;
             hf_store(own + i, v.x);
             hf_store(own + n + i, v.y);
             hf_store(own + 2 * n + i, v.z);
             hf_store(shares + i, pressed);
-            hf_store(shares + n + i, high * high);
-            hf_store(shares + 2 * n + i, low * low);
             load.part[l] += pressed;
-            cx.part[l] += pressed * r.x;
-            cy.part[l] += pressed * r.y;
-            cz.part[l] += pressed * r.z;
+        }
+    }
+    return hf_total_of(&load);
+}
+
+/* Store the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0). */
+static void hf_store_bands(const hf_finger *f, size_t now, hf_real s)
+{
+    const size_t n = f->n;
+    const hf_real *const own = hf_slide_at(f, now);
+    hf_real *const shares = f->shares;
+    const hf_wide none = {0}, band = none + HF_SHARE_NOISE * s;
+    for (size_t i = 0; i < n; i += HF_WIDTH) {
+        const hf_wide x = hf_load(own + i), y = hf_load(own + n + i);
+        const hf_wide shear = hf_root(x * x + y * y);
+        const hf_wide low = hf_greater(shear - band, none), high = shear + band;
+        hf_store(shares + n + i, high * high);
+        hf_store(shares + 2 * n + i, low * low);
+    }
+}
+
+/* Return sum |N_i| min(|T_i| / max(|N_i|, 5 s), 5). */
+static hf_real hf_sum_friction(const hf_finger *f, size_t now, hf_real s)
+{
+    const size_t n = f->n;
+    const hf_real *const own = hf_slide_at(f, now);
+    const hf_wide none = {0}, least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
+    hf_parts friction = hf_no_parts();
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
+            const hf_wide x = hf_load(own + i), y = hf_load(own + n + i);
+            const hf_wide pressed = hf_load(f->shares + i), shear = hf_root(x * x + y * y);
             friction.part[l] += pressed * hf_smaller(shear / hf_greater(pressed, least), most);
         }
     }
-    const hf_slide_sums sums = {
-        hf_total_of(&load), {hf_total_of(&cx), hf_total_of(&cy), hf_total_of(&cz)},
-        hf_total_of(&friction)};
-    return sums;
+    return hf_total_of(&friction);
+}
+
+/* Fill sum |N_i| r_i. */
+static void hf_sum_centre(const hf_finger *f, hf_real sums[3])
+{
+    const size_t n = f->n;
+    hf_parts cx = hf_no_parts(), cy = cx, cz = cx;
+    for (size_t i = 0; i < n;) {
+        for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
+            const hf_vectors r = hf_load_vectors(f->positions, n, i);
+            const hf_wide pressed = hf_load(f->shares + i);
+            cx.part[l] += pressed * r.x;
+            cy.part[l] += pressed * r.y;
+            cz.part[l] += pressed * r.z;
+        }
+    }
+    sums[0] = hf_total_of(&cx);
+    sums[1] = hf_total_of(&cy);
+    sums[2] = hf_total_of(&cz);
 }
 
 /* Return how many whole blocks of time a number is, from 1 to those that are kept. */
@@ -172,23 +213,34 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     if (f->hand->zero_unknown) {
         hf_note_least(f, normal);
     }
-    const hf_slide_sums sums = hf_sum_slide(f, now, m->noise);
-    const hf_real least = HF_LEAST_LOAD * m->force_noise;
-    m->weight = hf_max(sums.load, HF_TINY);
-    m->load = hf_max(sums.load, least);
+    const uint64_t kinds = hf_kinds_of_sliding(f->hand);
+    const hf_real load = hf_store_slide(f, now), least = HF_LEAST_LOAD * m->force_noise;
+    m->weight = hf_max(load, HF_TINY);
+    m->load = hf_max(load, least);
+    if (hf_needs(kinds, HF_FALLING_SHARE, HF_RISING_SHARE)) {
+        hf_store_bands(f, now, m->noise);
+    }
+    hf_real friction = 0, centre[3] = {0};
+    if (hf_needs(kinds, HF_TAXEL_FRICTION, HF_TAXEL_FRICTION) ||
+        hf_needs(kinds, HF_TAXEL_FRICTION_RISE, HF_TAXEL_FRICTION_RISE)) {
+        friction = hf_sum_friction(f, now, m->noise);
+    }
+    if (hf_needs(kinds, HF_CENTRE_SHIFT, HF_CENTRE_SHIFT)) {
+        hf_sum_centre(f, centre);
+    }
     /* F_t / |F_t|, r = min(|F_t| / max(|F_z|, 10 s sqrt(m)), 5), and the same of the taxels by w;
      * c = sum w_i r_i. */
     hf_real shear[3];
     for (size_t axis = 0; axis < 3; ++axis) {
         shear[axis] = track->force[axis] - normal * f->finger->normal[axis];
-        track->centre[axis] = sums.centre[axis] / m->weight;
+        track->centre[axis] = centre[axis] / m->weight;
     }
     const hf_real size = hf_sqrt(hf_square(shear));
     for (size_t axis = 0; axis < 3; ++axis) {
         m->tangent[axis] = shear[axis] / hf_max(size, HF_TINY);
     }
     track->friction = hf_min(size / hf_max(hf_abs(normal), least), HF_MAX_FRICTION);
-    track->taxel_friction = sums.friction / m->weight;
+    track->taxel_friction = friction / m->weight;
     track->amplitude = hf_sqrt(hf_square(track->force));
     if (f->state->motion.n_samples == 1) {
         hf_fill(m->past, HF_N_FRICTION_BLOCKS, 0);
@@ -196,8 +248,10 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
         m->largest = 0;
         m->block_start = time;
     }
-    m->friction = hf_smoothed(m->friction, track->friction, step, HF_FRICTION_SECONDS);
-    hf_note_friction(m, time);
+    if (hf_needs(kinds, HF_FRICTION_MARGIN, HF_FRICTION_MARGIN)) {
+        m->friction = hf_smoothed(m->friction, track->friction, step, HF_FRICTION_SECONDS);
+        hf_note_friction(m, time);
+    }
 }
 
 /* Sums over the changes of the taxels over a lag. */

@@ -52,6 +52,21 @@ FAULT_CODE = tuple(Reason).index(Reason.FAULT)
 """Code of the reason fault."""
 
 
+def check_shear(recording: Recording) -> None:
+    """Check that no module reads normal forces alone: features of slips need the shear.
+
+    Raises:
+        TrainingError: in one, x and y of all taxels never change, while z does.
+    """
+    for name, module in recording.modules.items():
+        changes = (module.readings != module.readings[:1]).any(axis=(0, 1))
+        if changes.tolist() == [False, False, True]:
+            raise TrainingError(
+                f"{name}: normal force alone of {module.sensor.name} in {recording.name} (x and y "
+                "of its taxels never change); three axes expected, as slips show in the shear"
+            )
+
+
 class HandlingKey(NamedTuple):
     """Where own handling stands in a model: a finger of the model (or `"*"`), and a sensor."""
 
@@ -119,8 +134,11 @@ class OwnHandling:
 
         Raises:
             ModelError: the recording has other fingers or sensors.
-            TrainingError: a sensor differs from that of the same name in an earlier recording.
+            TrainingError: a sensor differs from that of the same name in an earlier recording, or
+                has no shear, which a slip rule needs.
         """
+        if self.model.has_slip_rule:
+            check_shear(recording)
         totals = [sum(self.fingers(key).values()) for key in self.samples]
         if totals and min(totals) > MAX_HANDLING:
             self.n_left_out += 1

@@ -40,6 +40,7 @@ from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast.training.dataset_scan import OneRecording, Progress, show_nothing
 from holdfast.training.evaluation import compute_decisions
 from holdfast.training.head_fits import fit_slip
+from holdfast.training.own_handling import check_shear
 from holdfast.training.splits import check_nothing_shared
 from holdfast.training.targets import TargetInput, TargetSamples, slip_target
 from holdfast.training.thresholds import N_SHOWN, CurvePoint
@@ -190,7 +191,8 @@ def teach(
         false_alarms: maximum number per minute of held time of a finger.
 
     Raises:
-        TrainingError: too few slips or recordings, or no threshold gives so few false alarms.
+        TrainingError: too few slips or recordings, a sensor has no shear, or no threshold gives so
+            few false alarms.
         ModelError: the model lacks a finger of the recordings, or is for another sensor.
         ValueError: the number of false alarms is not above 0.
     """
@@ -300,6 +302,7 @@ def taught_recording(recording: Recording) -> Recording:
 
 def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPart:
     """Return the samples of one recording, of all fingers whose slips are known."""
+    check_shear(part[0])
     recording = at_rate(taught_recording(part[0]), model.rate)
     modules = recording.modules
     sensors = model.fingers_of({name: module.sensor for name, module in modules.items()})

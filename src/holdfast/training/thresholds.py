@@ -280,8 +280,8 @@ class Curve:
         return cls(THRESHOLDS.tolist(), partial(at, most=most))
 
     @classmethod
-    def of_slips(cls, model: Model, recordings: Iterable[Recording]) -> Self:
-        """Return the curve of the slips of all fingers.
+    def of_slips(cls, model: Model, recordings: Iterable[Recording]) -> dict[HeadName, Self]:
+        """Return the curve of the slips of all fingers, for each head that decides about some.
 
         Raises:
             ModelError: the model has no slip rule.
@@ -292,17 +292,22 @@ class Curve:
                 f"{model.name or 'the model'} has no slip rule; train one on recordings whose "
                 "slips are known"
             )
-        known = [compute_decisions(model, recording).known_slips for recording in recordings]
-        counters = [(slip, SlipCounter.of(slip)) for slips in known for slip in slips.values()]
+        counters: dict[HeadName, list[tuple[SlipDecisions, SlipCounter]]] = {}
+        n = 0
+        for n, recording in enumerate(recordings, 1):
+            for finger, slip in compute_decisions(model, recording).known_slips.items():
+                head = slip_head_of(model, recording, finger)
+                counters.setdefault(head, []).append((slip, SlipCounter.of(slip)))
         if not counters:
-            raise TrainingError(f"{len(known)} recordings without slips that are known")
+            raise TrainingError(f"{n} recordings without slips that are known")
 
-        def at(threshold: float) -> CurvePoint:
+        def at(head: HeadName, threshold: float) -> CurvePoint:
             only = np.array([threshold])
-            counts = [counter.count(slip.raised_at(only))[0] for slip, counter in counters]
+            counts = [counter.count(slip.raised_at(only))[0] for slip, counter in counters[head]]
             return CurvePoint.of_slips(threshold, SlipCounts.total(counts))
 
-        return cls(SLIP_THRESHOLDS[::-1].tolist(), at)
+        thresholds = SLIP_THRESHOLDS[::-1].tolist()
+        return {name: cls(thresholds, partial(at, name)) for name in sorted(counters)}
 
     def choose(self, false_alarms: float) -> tuple[CurvePoint, list[CurvePoint]]:
         """Return the best point with few enough false alarms, and all usable points in order.
@@ -347,12 +352,17 @@ class Tuned:
         chosen: its errors.
         before: errors of the model that was given.
         points: thresholds around it, lowest first; the chosen one is among them.
+        head: whose threshold it is.
+        changes: the same of `slip_changes`, with the model that has both; None if no recording
+            begins in contact.
     """
 
     model: Model
     chosen: CurvePoint
     before: CurvePoint
     points: tuple[CurvePoint, ...]
+    head: HeadName
+    changes: "Tuned | None" = None
 
     def document(self) -> dict[str, Any]:
         """Return the chosen threshold, with the errors before it and around it, for JSON."""
@@ -360,12 +370,24 @@ class Tuned:
             {"threshold": point.threshold, **msgspec.to_builtins(point.scores)}
             for point in self.points
         ]
-        return ({} if self.chosen.slips is None else {"for": "slip"}) | {
+        changes = {} if self.changes is None else {"slip_changes": self.changes.document()}
+        return ({} if self.chosen.slips is None else {"for": self.head}) | {
             "threshold": self.chosen.threshold,
             "chosen": self.chosen.scores,
             "before": self.before.scores,
             "around": around,
-        }
+        } | changes
+
+    @property
+    def other_head(self) -> str:
+        """What becomes of the slip head that has no part in `changes`, in one line; else empty."""
+        if self.chosen.slips is None or self.changes is not None:
+            return ""
+        if self.head == "slip_changes":
+            return "slip keeps its threshold: all recordings begin in contact"
+        if any(part.head("slip_changes") for part in self.model.fingers.values()):
+            return "slip_changes keeps its threshold: no recording begins in contact"
+        return "no slip_changes: slip decides on what begins in contact, too"
 
 
 def tune(
@@ -386,7 +408,8 @@ def tune(
         recordings: labelled; of slips, with a truth or labels of slips.
         false_alarms: maximum number per minute of stable label of the hand; of slips, per minute
             of held time of one finger.
-        head: whose threshold is chosen.
+        head: whose threshold is chosen; of `slip`, that of `slip_changes` too, each by the
+            recordings on which it decides.
         progress: iterates over the recordings.
 
     Raises:
@@ -401,29 +424,46 @@ def tune(
         least = "above 0" if is_slip else "of at least 0"
         raise ValueError(f"false alarms per minute {least} expected, {false_alarms:g} given")
     digests: dict[str, str] = {}
-    highest = 0.0
+    highest: dict[HeadName, float] = {}
 
     def read() -> Iterator[Recording]:
-        nonlocal highest
         for recording in progress(recordings):
             digests[recording.name] = recording.readings_digest
             sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-            heads = [model.finger(*finger).head(head) for finger in sensors.items()]
-            highest = max([highest, *(known.threshold for known in heads if known is not None)])
+            for finger in sensors.items():
+                for one in model.finger(*finger).heads:
+                    highest[one.name] = max(highest.get(one.name, 0.0), one.threshold)
             yield recording
 
-    curve = (Curve.of_slips if is_slip else Curve.of_stability)(model, read())
-    before = curve.at(highest)
-    if is_slip and (refusal := too_short(before.minutes, false_alarms)):
-        raise TrainingError(refusal)
-    chosen, points = curve.choose(false_alarms)
-    index = points.index(chosen)
-    shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
-    # The live page shows the errors at any threshold of stability.
-    choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
-    tuned = model.with_threshold(head, chosen.threshold, choice)
+    curves: dict[HeadName, Curve] = (
+        Curve.of_slips(model, read())
+        if is_slip
+        else {"stable": Curve.of_stability(model, read())}
+    )
     name = f"{model.name}, tuned" if model.name else ""
-    return Tuned(msgspec.structs.replace(tuned, name=name), chosen, before, tuple(shown))
+    model = msgspec.structs.replace(model, name=name)
+    parts: list[Tuned] = []
+    for head, curve in curves.items():
+        before = curve.at(highest[head])
+        if is_slip and (refusal := too_short(before.minutes, false_alarms)):
+            raise TrainingError(f"{head}: {refusal}")
+        chosen, points = curve.choose(false_alarms)
+        index = points.index(chosen)
+        shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
+        # The live page shows the errors at any threshold of stability.
+        choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
+        model = model.with_threshold(head, chosen.threshold, choice)
+        parts.append(Tuned(model, chosen, before, tuple(shown), head))
+    first, *others = parts
+    return replace(first, model=model, changes=others[0] if others else None)
+
+
+def slip_head_of(model: Model, recording: Recording, finger: str) -> HeadName:
+    """Return the name of the head that decides about the slips of a finger of a recording."""
+    sensor = recording.modules[finger].sensor
+    plan = model.plan({finger: sensor}, recording.rate).for_recording(recording)
+    head = model.finger(finger, sensor).deciding("slip", zero_unknown=plan.zero_unknown)
+    return "slip" if head is None else head.name
 
 
 def too_short(minutes: float, false_alarms: float) -> str:

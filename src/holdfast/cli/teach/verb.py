@@ -15,6 +15,7 @@ from holdfast.cli.options import (
     SpeedOption,
     StartOptions,
     check_source,
+    report_too_few_taxels,
 )
 from holdfast.cli.teach.options import WITHOUT_PROTOCOL, GuideOptions, calibrated
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_paragraph
@@ -99,11 +100,12 @@ def teach(
             else:
                 print_paragraph(f"{out}: {NO_SLIPS}")
             return
+    recordings = start.load_dataset(engine.path(path))
     taught = teach_with_report(
-        base, start.load_dataset(engine.path(path)),
-        false_alarms=false_alarms, seed=seed, engine=engine, progress=progress,
-    )  # fmt: skip
+        base, recordings, false_alarms=false_alarms, seed=seed, engine=engine, progress=progress
+    )
     taught.model.save(out, force=force)
+    report_too_few_taxels(taught.model, recordings)
     for warning in taught.warnings:
         print_message(warning)
     if as_json:
