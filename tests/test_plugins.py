@@ -103,7 +103,7 @@ def test_each_is_found_by_its_name_and_listed_after_our_own(parts, caplog):
     assert parse("gone://host")[0] == "gone"
     with pytest.raises(ValueError, match="of plug-ins: grab, hollow, ros2"):
         open_hand("grip:left")
-    with pytest.raises(ValueError, match="xela:, twin:, serial:, gone:, mute:"):
+    with pytest.raises(ValueError, match="xela:, twin:, serial:, orca:, gone:, mute:"):
         open_source("none:")
     (report,) = reports(caplog)
     assert report.startswith("plug-in twin (sources of acme 1.2) is skipped")

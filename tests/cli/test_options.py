@@ -7,7 +7,7 @@ from typer.models import OptionInfo
 from holdfast.cli import app
 
 OTHER_MEANING = {
-    "--false-alarms": "by labels of events, and of all alarms in handling without labels",
+    "--false-alarms": "of stability or slips by labels, and of slips in handling without labels",
     "--for": "the threshold that tune chooses, and the one answer that train fits",
     "--format": "of the input, and of exported recordings",
     "--fps": "of an exported dataset, and of a video of stickers",
@@ -19,6 +19,7 @@ OTHER_MEANING = {
     "--set": "metadata of a recording, and parameters of a rule",
     "--speed": "play cannot send as fast as possible",
     "--separate": "classifiers of the fingers, and sensors in a packet",
+    "--unit": "of the readings of a file, and of a described sensor",
     "--video": "films each recording of the twin, and names the film of a recording",
     "-o": "the model file, and the folder of a report",
 }

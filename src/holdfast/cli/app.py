@@ -46,7 +46,7 @@ VERB_GROUPS = {
         "train": "Train a model from labelled recordings.",
         "evaluate": "Evaluate a model on labelled recordings.",
         "tune": "Choose the threshold for a wanted rate of false alarms.",
-        "calibrate": "Fit a model to a hand by a minute of handling, without labels.",
+        "calibrate": "Fit a model to a hand by two minutes of handling, without labels.",
     },
     "More": {
         "demo": "Detect on real and simulated recordings; train; replay live.",

@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.options import (
-    RARE,
     ForceOption,
     JsonOption,
     ModelArgument,
@@ -51,7 +50,7 @@ def calibrate(
         float | None,
         typer.Option(help="Time for which a live source is recorded [s].", show_default="120"),
     ] = None,
-    speed: Annotated[SpeedOption, RARE] = 1.0,
+    speed: SpeedOption = 1.0,
     start: StartOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,

@@ -215,10 +215,14 @@ HF_SHARED bool hf_find_jumps(const hf_finger *f, const hf_scan *scan, holdfast_t
         if (hf_has(jumps, i) || hf_has(&before, i) || !(hf_square(step) > least)) {
             continue; /* at its second sample, a jump is plausible */
         }
-        /* A sensor with a dead band jumps to and from zeros, too. */
-        const bool has_readings =
-            hf_has_reading(f->readings, n, i) && hf_has_reading(f->previous, n, i);
-        const bool stays = is_lone && has_readings && !hf_has(&s->offset_taxels, i) &&
+        /* A sensor with a dead band jumps to and from zeros, too; one at an end of its range is
+         * saturated. */
+        bool is_between = hf_has_reading(f->readings, n, i) && hf_has_reading(f->previous, n, i);
+        for (size_t axis = 0; axis < 3; ++axis) {
+            const hf_real reading = f->readings[axis * n + i];
+            is_between = is_between && f->finger->low < reading && reading < f->finger->high;
+        }
+        const bool stays = is_lone && is_between && !hf_has(&s->offset_taxels, i) &&
                            hf_is_offset(f, step, others, hf_max(of_noise, each), quiet);
         if (is_loud || stays) {
             hf_include(&s->jumped, i);

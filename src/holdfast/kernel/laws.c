@@ -121,7 +121,7 @@ static bool hf_return(const hf_finger *f)
             left_out = is_equal ? l : left_out;
             n_equal += is_equal;
         }
-        left_out = n_equal > 1 ? HF_LANES : left_out; /* all returned */
+        left_out = n_equal > 1 ? (size_t)HF_LANES : left_out; /* all returned */
         if (n_equal > 0 && hf_has_three_readings(w, left_out)) {
             w->n_left = HF_RUN;
             w->is_repeated = w->is_repeated || hf_do_vary(f, left_out);

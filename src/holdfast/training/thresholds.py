@@ -293,13 +293,14 @@ class Curve:
                 "slips are known"
             )
         counters: dict[HeadName, list[tuple[SlipDecisions, SlipCounter]]] = {}
-        n = 0
-        for n, recording in enumerate(recordings, 1):
+        n_recordings = 0
+        for recording in recordings:
+            n_recordings += 1
             for finger, slip in compute_decisions(model, recording).known_slips.items():
                 head = slip_head_of(model, recording, finger)
                 counters.setdefault(head, []).append((slip, SlipCounter.of(slip)))
         if not counters:
-            raise TrainingError(f"{n} recordings without slips that are known")
+            raise TrainingError(f"{n_recordings} recordings without slips that are known")
 
         def at(head: HeadName, threshold: float) -> CurvePoint:
             only = np.array([threshold])
@@ -371,12 +372,16 @@ class Tuned:
             for point in self.points
         ]
         changes = {} if self.changes is None else {"slip_changes": self.changes.document()}
-        return ({} if self.chosen.slips is None else {"for": self.head}) | {
-            "threshold": self.chosen.threshold,
-            "chosen": self.chosen.scores,
-            "before": self.before.scores,
-            "around": around,
-        } | changes
+        return (
+            ({} if self.chosen.slips is None else {"for": self.head})
+            | {
+                "threshold": self.chosen.threshold,
+                "chosen": self.chosen.scores,
+                "before": self.before.scores,
+                "around": around,
+            }
+            | changes
+        )
 
     @property
     def other_head(self) -> str:
@@ -431,29 +436,28 @@ def tune(
             digests[recording.name] = recording.readings_digest
             sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
             for finger in sensors.items():
-                for one in model.finger(*finger).heads:
-                    highest[one.name] = max(highest.get(one.name, 0.0), one.threshold)
+                for given_head in model.finger(*finger).heads:
+                    name = given_head.name
+                    highest[name] = max(highest.get(name, 0.0), given_head.threshold)
             yield recording
 
     curves: dict[HeadName, Curve] = (
-        Curve.of_slips(model, read())
-        if is_slip
-        else {"stable": Curve.of_stability(model, read())}
+        Curve.of_slips(model, read()) if is_slip else {"stable": Curve.of_stability(model, read())}
     )
     name = f"{model.name}, tuned" if model.name else ""
     model = msgspec.structs.replace(model, name=name)
     parts: list[Tuned] = []
-    for head, curve in curves.items():
-        before = curve.at(highest[head])
+    for head_name, curve in curves.items():
+        before = curve.at(highest[head_name])
         if is_slip and (refusal := too_short(before.minutes, false_alarms)):
-            raise TrainingError(f"{head}: {refusal}")
+            raise TrainingError(f"{head_name}: {refusal}")
         chosen, points = curve.choose(false_alarms)
         index = points.index(chosen)
         shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
         # The live page shows the errors at any threshold of stability.
         choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
-        model = model.with_threshold(head, chosen.threshold, choice)
-        parts.append(Tuned(model, chosen, before, tuple(shown), head))
+        model = model.with_threshold(head_name, chosen.threshold, choice)
+        parts.append(Tuned(model, chosen, before, tuple(shown), head_name))
     first, *others = parts
     return replace(first, model=model, changes=others[0] if others else None)
 

@@ -384,6 +384,7 @@ class Finger:
             return set()
         before, self.jumped, self.pending = self.jumped, set(), {}
         last, n, magnetic = self.samples[-1][1], len(self.used), self.sensor.magnetic
+        low, high = self.sensor.range or (-math.inf, math.inf)
         moves = {i: readings[i] - last[i] for i in self.used}
         steps = {i: float(move @ move) for i, move in moves.items()}
         at_zero = {i for i in self.used if magnetic and not readings[i].any()}
@@ -407,6 +408,7 @@ class Finger:
             if not (loud or alone) or not steps[i] > (quiet if loud else most / 2):
                 continue
             stays = alone and readings[i].any() and last[i].any() and i not in self.offsets
+            stays &= bool((low < readings[i]).all() and (readings[i] < high).all())
             if stays and self.is_offset(moves[i], others, max(noise, each), quiet):
                 self.pending[i] = moves[i]
             if loud or i in self.pending:

@@ -87,7 +87,7 @@ def test_from_nothing_has_the_features_of_the_model(corpus, monkeypatch):
     )
     found = model_estimates("from nothing", corpus, 0)
     shipped = Model.load(SHIPPED)
-    assert {setting.features for setting in settings} == {shipped.finger("finger1").features}
+    assert {setting.features for setting in settings} == {shipped.finger("finger1").stable.features}
     assert {str(setting.tare) for setting in settings} == {shipped.tare}
     assert {setting.init for setting in settings} == {None}
     assert found != model_estimates("untouched", corpus, 0)

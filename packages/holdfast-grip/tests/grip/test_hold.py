@@ -61,7 +61,7 @@ def test_a_model_that_reports_no_slip_is_warned_of(tmp_path, grasp, capsys):
     Model.load("builtin:any").with_threshold("slip", 1.0).save(path)
     hand = f"log:{tmp_path / 'hand'}"
     assert main(["hold", str(path), str(grasp), "--hand", hand, "--speed", "0"]) == 0
-    assert "holdfast teach" in capsys.readouterr().err
+    assert "holdfast calibrate" in capsys.readouterr().err
 
 
 def test_armed_commands_reach_the_hand_and_stdout(tmp_path, grasp, capsys, monkeypatch):

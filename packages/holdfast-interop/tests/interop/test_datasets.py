@@ -115,7 +115,9 @@ def test_bad_input(capsys, made_up, cache):
         (("get", "made-up", "out", "--mirror", "ftp://x"), "--mirror"),
     ):
         assert named in refused(capsys, *words)
-    made_up.replaced["made-up/two.csv"] = csv_of(1).encode() + b"2.0,a\n"
+    rows = csv_of(1).splitlines()
+    rows[5] = "a" + rows[5]
+    made_up.replaced["made-up/two.csv"] = "\n".join(rows).encode()
     text = refused(capsys, "get", "made-up", "out")
     assert f"{cache}/made-up/two.csv" in text
     assert ".import." not in text
