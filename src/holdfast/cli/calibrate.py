@@ -72,7 +72,7 @@ def calibrate(
     Example:
       holdfast calibrate builtin:any handling/ -o mine.json
       holdfast calibrate builtin:any xela://auto -o mine.json --seconds 60
-      holdfast calibrate builtin:any 'twin:?seed=3' -o mine.json --speed 0
+      holdfast calibrate builtin:any 'twin:?seed=3' -o mine.json
     """
     from holdfast.detection import Model
     from holdfast.devices import sources
