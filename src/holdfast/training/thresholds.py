@@ -294,7 +294,8 @@ class Curve:
             )
         counters: dict[HeadName, list[tuple[SlipDecisions, SlipCounter]]] = {}
         n = 0
-        for n, recording in enumerate(recordings, 1):
+        for recording in recordings:
+            n += 1
             for finger, slip in compute_decisions(model, recording).known_slips.items():
                 head = slip_head_of(model, recording, finger)
                 counters.setdefault(head, []).append((slip, SlipCounter.of(slip)))
@@ -371,12 +372,16 @@ class Tuned:
             for point in self.points
         ]
         changes = {} if self.changes is None else {"slip_changes": self.changes.document()}
-        return ({} if self.chosen.slips is None else {"for": self.head}) | {
-            "threshold": self.chosen.threshold,
-            "chosen": self.chosen.scores,
-            "before": self.before.scores,
-            "around": around,
-        } | changes
+        return (
+            ({} if self.chosen.slips is None else {"for": self.head})
+            | {
+                "threshold": self.chosen.threshold,
+                "chosen": self.chosen.scores,
+                "before": self.before.scores,
+                "around": around,
+            }
+            | changes
+        )
 
     @property
     def other_head(self) -> str:
@@ -436,24 +441,22 @@ def tune(
             yield recording
 
     curves: dict[HeadName, Curve] = (
-        Curve.of_slips(model, read())
-        if is_slip
-        else {"stable": Curve.of_stability(model, read())}
+        Curve.of_slips(model, read()) if is_slip else {"stable": Curve.of_stability(model, read())}
     )
-    name = f"{model.name}, tuned" if model.name else ""
-    model = msgspec.structs.replace(model, name=name)
+    title = f"{model.name}, tuned" if model.name else ""
+    model = msgspec.structs.replace(model, name=title)
     parts: list[Tuned] = []
-    for head, curve in curves.items():
-        before = curve.at(highest[head])
+    for name, curve in curves.items():
+        before = curve.at(highest[name])
         if is_slip and (refusal := too_short(before.minutes, false_alarms)):
-            raise TrainingError(f"{head}: {refusal}")
+            raise TrainingError(f"{name}: {refusal}")
         chosen, points = curve.choose(false_alarms)
         index = points.index(chosen)
         shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
         # The live page shows the errors at any threshold of stability.
         choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
-        model = model.with_threshold(head, chosen.threshold, choice)
-        parts.append(Tuned(model, chosen, before, tuple(shown), head))
+        model = model.with_threshold(name, chosen.threshold, choice)
+        parts.append(Tuned(model, chosen, before, tuple(shown), name))
     first, *others = parts
     return replace(first, model=model, changes=others[0] if others else None)
 
