@@ -16,6 +16,8 @@ from holdfast.plots.time_series import finger_series
 
 HEIGHTS = (1.0, 0.8, 0.8)
 """Of the speed, and of P(slip) before and after [inch]."""
+SHOWN = (0.005, 0.999)
+"""Probabilities that are shown, by their log odds: thresholds are near 1."""
 
 
 def main(options: argparse.Namespace) -> None:
@@ -29,7 +31,12 @@ def main(options: argparse.Namespace) -> None:
     for axes, title, path in zip(probabilities, titles, options.models, strict=True):
         decisions = slip_series(Model.load(path), recording)[name]
         draw_slip_decisions(speed, axes, decisions)
+        axes.set_yscale("logit")
+        axes.set_ylim(*SHOWN)
+        axes.set_yticks((0.01, 0.5, 0.99), ("0.01", "0.5", "0.99"))
+        axes.minorticks_off()
         add_title(axes, title.format(decisions.threshold))
+    speed.set_xlim(*options.seconds)
     add_labels(probabilities[-1], x="time [s]")
     figure.savefig(options.out, dpi=options.dpi)
 
@@ -41,5 +48,6 @@ if __name__ == "__main__":
     parser.add_argument("grasp", type=Path, help="simulated, with slips")
     parser.add_argument("models", nargs=2, help="before and after")
     parser.add_argument("-o", "--out", type=Path, required=True)
+    parser.add_argument("--seconds", type=float, nargs=2, default=(None, None), help="are shown")
     parser.add_argument("--dpi", type=int, default=90)
     main(parser.parse_args())

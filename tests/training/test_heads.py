@@ -1,5 +1,7 @@
 """Every way to change a model keeps what it does not change: all four heads; the fit of causes."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -39,6 +41,11 @@ def handling_labelled(seed):
         Label(5.2, 9.0, ContactState.STABLE),
     )
     return made.with_labels(dict.fromkeys(made.modules, labels))
+
+
+def begun(recording, *, loaded):
+    name = f"{recording.name}-{loaded}"
+    return dataclasses.replace(recording, name=name, metadata={"starts_loaded": loaded})
 
 
 def heads_of(model, *left_out):
@@ -105,6 +112,26 @@ def test_a_tuned_model_keeps_all_heads(model, changed, seeds, tuned):
     before, after = (m.fingers[ANY_FINGER].head(changed) for m in (model, found))
     assert after.choice.recordings == {made.name: made.readings_digest for made in data}
     assert replace(after, threshold=before.threshold, choice=before.choice) == before
+
+
+@pytest.mark.parametrize(
+    ("loaded", "heads", "line"),
+    [((False, True), ["slip", "slip_changes"], ""),
+     ((False,), ["slip"], "slip_changes keeps its threshold"),
+     ((True,), ["slip_changes"], "slip keeps its threshold")],
+)  # fmt: skip
+def test_each_slip_head_is_tuned_by_the_recordings_on_which_it_decides(model, loaded, heads, line):
+    data = [
+        begun(sliding_recording(seed), loaded=starts_loaded)
+        for starts_loaded in loaded
+        for seed in range(20, 24)
+    ]
+    tuned = tune(model, data, 20.0, "slip")
+    parts = [tuned, tuned.changes] if tuned.changes else [tuned]
+    assert [part.head for part in parts] == heads
+    assert tuned.other_head.startswith(line) and bool(tuned.other_head) == bool(line)
+    part = tuned.model.fingers[ANY_FINGER]
+    assert [part.head(name).threshold for name in heads] == [x.chosen.threshold for x in parts]
 
 
 def caused_recording(seed, *causes):

@@ -219,9 +219,7 @@ def test_a_sensor_of_normal_force_is_refused_by_name(axes, refused):
         modules[name] = replace(module, readings=readings)
     made = replace(made, modules=modules)
     if refused:
-        with pytest.raises(
-            TrainingError, match=f"{next(iter(modules))}: normal force alone of pad"
-        ):
+        with pytest.raises(TrainingError, match="normal force alone of pad in "):
             check_shear(made)
     else:
         check_shear(made)

@@ -293,14 +293,14 @@ class Curve:
                 "slips are known"
             )
         counters: dict[HeadName, list[tuple[SlipDecisions, SlipCounter]]] = {}
-        n_recordings = 0
+        n = 0
         for recording in recordings:
-            n_recordings += 1
+            n += 1
             for finger, slip in compute_decisions(model, recording).known_slips.items():
                 head = slip_head_of(model, recording, finger)
                 counters.setdefault(head, []).append((slip, SlipCounter.of(slip)))
         if not counters:
-            raise TrainingError(f"{n_recordings} recordings without slips that are known")
+            raise TrainingError(f"{n} recordings without slips that are known")
 
         def at(head: HeadName, threshold: float) -> CurvePoint:
             only = np.array([threshold])
@@ -436,28 +436,27 @@ def tune(
             digests[recording.name] = recording.readings_digest
             sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
             for finger in sensors.items():
-                for given_head in model.finger(*finger).heads:
-                    name = given_head.name
-                    highest[name] = max(highest.get(name, 0.0), given_head.threshold)
+                for one in model.finger(*finger).heads:
+                    highest[one.name] = max(highest.get(one.name, 0.0), one.threshold)
             yield recording
 
     curves: dict[HeadName, Curve] = (
         Curve.of_slips(model, read()) if is_slip else {"stable": Curve.of_stability(model, read())}
     )
-    name = f"{model.name}, tuned" if model.name else ""
-    model = msgspec.structs.replace(model, name=name)
+    title = f"{model.name}, tuned" if model.name else ""
+    model = msgspec.structs.replace(model, name=title)
     parts: list[Tuned] = []
-    for head_name, curve in curves.items():
-        before = curve.at(highest[head_name])
+    for name, curve in curves.items():
+        before = curve.at(highest[name])
         if is_slip and (refusal := too_short(before.minutes, false_alarms)):
-            raise TrainingError(f"{head_name}: {refusal}")
+            raise TrainingError(f"{name}: {refusal}")
         chosen, points = curve.choose(false_alarms)
         index = points.index(chosen)
         shown = points[max(index - N_SHOWN, 0) : index + N_SHOWN + 1]
         # The live page shows the errors at any threshold of stability.
         choice = chosen.choice(false_alarms, digests, shown if is_slip else points)
-        model = model.with_threshold(head_name, chosen.threshold, choice)
-        parts.append(Tuned(model, chosen, before, tuple(shown), head_name))
+        model = model.with_threshold(name, chosen.threshold, choice)
+        parts.append(Tuned(model, chosen, before, tuple(shown), name))
     first, *others = parts
     return replace(first, model=model, changes=others[0] if others else None)
 
