@@ -115,22 +115,23 @@ class TestSlipTruth:
         assert found.quiet.tolist() == [True, True, False]
 
     def test_labels_where_there_is_no_truth(self):
-        times = np.arange(600) / RATE
+        times = np.arange(800) / RATE
         labels = (
             Label(0.0, 1.0, ContactState.UNSTABLE, Cause.CLOSING),
             Label(1.0, 2.0, ContactState.STABLE),
             Label(2.0, 3.0, ContactState.UNSTABLE, Cause.SLIP),
             Label(3.0, 4.0, ContactState.UNSTABLE, Cause.DISTURBANCE),
             Label(4.0, 5.0, ContactState.UNSTABLE),
+            Label(6.0, 7.0, ContactState.STABLE),
         )
-        module = Tactile(sensor("uskin-4x4"), times, np.zeros((600, 16, 3)), labels=labels)
+        module = Tactile(sensor("uskin-4x4"), times, np.zeros((800, 16, 3)), labels=labels)
         found = slip_truth(Recording("made", {"thumb": module}), "thumb", times)
-        at = [found.codes[round(RATE * t)] for t in (0.5, 1.5, 2.5, 3.5, 4.5, 5.5)]
-        assert at == [NOT_HELD, STILL, SLIDING, STILL, CREEPING, NOT_HELD]
+        at = [found.codes[round(RATE * t)] for t in np.arange(8) + 0.5]
+        assert at == [NOT_HELD, STILL, SLIDING, STILL, CREEPING, CREEPING, STILL, NOT_HELD]
         assert found.onsets == "labels"
         assert [slip[:2] for slip in found.slips] == [(2.0, 3.0)]
         assert math.isnan(found.slips[0].distance)
-        assert found.quiet.sum() == 100
+        assert found.quiet.sum() == 200
 
     def test_nothing_without_truth_and_labels(self):
         times = np.arange(3) / RATE

@@ -24,6 +24,15 @@ from holdfast.recordings import Truth
 from .slips import RATE, decisions, slip
 
 
+def test_the_share_of_unknown_time_is_that_of_labels():
+    made = decisions([], seconds=10.0)
+    codes = np.repeat([NOT_HELD, STILL, SLIDING, CREEPING], [200, 500, 100, 200]).astype(np.int8)
+    truth = replace(made.truth, codes=codes, onsets="labels")
+    assert slip_metrics(count_slips(replace(made, truth=truth))).unknown == pytest.approx(25.0)
+    by_truth = replace(truth, onsets="truth")
+    assert slip_metrics(count_slips(replace(made, truth=by_truth))).unknown is None
+
+
 class TestFound:
     @pytest.mark.parametrize(
         ("alarm", "shares"),

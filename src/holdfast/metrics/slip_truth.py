@@ -29,7 +29,8 @@ from holdfast.sensors.types import Array
 Codes = npt.NDArray[np.int8]
 
 NOT_HELD, STILL, CREEPING, SLIDING = range(-1, 3)
-"""Codes of the truth of a slip at a sample."""
+"""Codes of the truth of a slip at a sample. By labels, CREEPING is held time of which nobody knows
+whether the finger slides."""
 
 STILL_SPEED = 0.0003
 """Speed below which a held contact does not slide [m/s]."""
@@ -195,8 +196,9 @@ def slip_truth(
 ) -> SlipTruth | None:
     """Return the truth of the slips of a finger at some times.
 
-    It is that of the recording; without it, labels are taken as they are: a label with the cause
-    slip slides, another one of a held contact does not.
+    It is that of the recording; without it, labels name three kinds of held time. A label with the
+    cause slip slides. One that is stable, or unstable for another cause, is still. What is unstable
+    without a cause, or has no label between two labels of held contact, is unknown: CREEPING.
 
     Args:
         recording: with a truth or labels of the finger.
@@ -209,7 +211,7 @@ def slip_truth(
     """
     labels, truth = recording.modules[finger].labels, recording.truth
     stable = np.zeros(len(times), dtype=bool) if quiet is None else quiet
-    codes = np.full(len(times), NOT_HELD, dtype=np.int8)
+    codes, unlabelled = np.full(len(times), NOT_HELD, dtype=np.int8), np.ones(len(times), dtype=bool)
     for label in labels:
         start, end = label.start - TIME_TOLERANCE, label.end - TIME_TOLERANCE
         rows = slice(*np.searchsorted(times, (start, end)).tolist())
@@ -220,8 +222,12 @@ def slip_truth(
             codes[rows] = NOT_HELD
         elif label.cause is Cause.SLIP:
             codes[rows] = SLIDING
-        else:  # what is unstable for no stated cause may slide: it is neither right nor wrong
+        else:
             codes[rows] = STILL if is_stable or label.cause is not None else CREEPING
+        unlabelled[rows] = False
+    for first, last in runs(unlabelled).tolist():
+        if 0 < first and last < len(times) and NOT_HELD not in codes[[first - 1, last]]:
+            codes[first:last] = CREEPING
     if truth is not None and has_slip_truth(truth, finger):
         index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)
         codes = _truth_codes(truth, finger)[index]  # they outrank the labels

@@ -12,6 +12,7 @@ from holdfast.metrics.alarms import first_alarms, outside
 from holdfast.metrics.masks import Mask
 from holdfast.metrics.samples import N_BINS, bins_of
 from holdfast.metrics.slip_truth import (
+    CREEPING,
     DISTANCES,
     NOT_HELD,
     SLIDING,
@@ -62,6 +63,8 @@ class SlipCounts:
         n_impacts: impacts on object or arm in which the finger holds the object and is away from
             its slips.
         false_impacts: those in which the decision is raised, until 0.25 s after their end.
+        known_seconds: duration of held time that slides or is still [s].
+        unknown_seconds: duration of the other held time [s]; 0 by a truth.
     """
 
     delays: Array
@@ -78,6 +81,8 @@ class SlipCounts:
     onsets: frozenset[Onsets]
     n_impacts: int = 0
     false_impacts: Count = 0
+    known_seconds: float = 0.0
+    unknown_seconds: float = 0.0
 
     @classmethod
     def total(cls, parts: Iterable[Self]) -> Self:
@@ -222,6 +227,10 @@ class SlipCounter:
             "scores": np.array(histograms),
             "onsets": frozenset({truth.onsets}),
             "n_impacts": len(impacts),
+            "known_seconds": float(steps[np.isin(truth.codes, (STILL, SLIDING))].sum()),
+            "unknown_seconds": float(steps[truth.codes == CREEPING].sum())
+            if truth.onsets != "truth"
+            else 0.0,
         }
         spent = elapsed(quiet), elapsed(counted)
         return cls(times, windows, away, reached, impacts, *spent, known)
@@ -304,6 +313,8 @@ class SlipMetrics(msgspec.Struct, frozen=True, omit_defaults=True):
         held_minutes: of one finger, without creep, slips and the time of their alarms [min].
         onsets: `truth`, `labels`, `rule` (labels by a rule), or `mixed`.
         impacts: None if the truth has no impacts.
+        unknown: share of held time of which the labels do not say whether it slides [%]; None if
+            they say it of all.
     """
 
     n: int
@@ -321,6 +332,7 @@ class SlipMetrics(msgspec.Struct, frozen=True, omit_defaults=True):
     held_minutes: float
     onsets: Onsets
     impacts: ImpactMetrics | None = None
+    unknown: float | None = None
 
 
 def slip_metrics(counts: SlipCounts) -> SlipMetrics:
@@ -356,6 +368,8 @@ def slip_metrics(counts: SlipCounts) -> SlipMetrics:
         impacts=ImpactMetrics(counts.n_impacts, counts.false_impacts / counts.n_impacts)
         if counts.n_impacts
         else None,
+        unknown=percent(counts.unknown_seconds, counts.known_seconds + counts.unknown_seconds)
+        or None,
     )
 
 
