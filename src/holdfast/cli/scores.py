@@ -166,7 +166,9 @@ def print_slips(
     if pooled.raised_quiet is not None:
         support += f"; a slip is reported in {pooled.raised_quiet:.2f} % of quiet hold"
     if pooled.unknown is not None:
-        support += f"; {pooled.unknown:.0f} % of the held time is unknown: no label says what slides"
+        support += (
+            f"; {pooled.unknown:.0f} % of the held time is unknown: no label says what slides"
+        )
     print_paragraph(f"Of one finger: {support}.{NEVER_NOTE}")
     if (impacts := pooled.impacts) is not None:
         print_paragraph(

@@ -211,7 +211,10 @@ def slip_truth(
     """
     labels, truth = recording.modules[finger].labels, recording.truth
     stable = np.zeros(len(times), dtype=bool) if quiet is None else quiet
-    codes, unlabelled = np.full(len(times), NOT_HELD, dtype=np.int8), np.ones(len(times), dtype=bool)
+    codes, unlabelled = (
+        np.full(len(times), NOT_HELD, dtype=np.int8),
+        np.ones(len(times), dtype=bool),
+    )
     for label in labels:
         start, end = label.start - TIME_TOLERANCE, label.end - TIME_TOLERANCE
         rows = slice(*np.searchsorted(times, (start, end)).tolist())

@@ -15,11 +15,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
-from holdfast.contact import Cause, ContactState
+from holdfast.contact import STABLE, Cause, ContactState
 from holdfast.detection import Tare
 from holdfast.detection.plan import TareArgument
 from holdfast.io.foreign import read_stickers
@@ -51,6 +51,15 @@ SLIP_MARGIN = 0.05
 """Time around a slip that is left out of the second fit [s]."""
 RETURN_TIME = 0.3
 """Motions with less time between them are one: a push goes there, rests, and comes back [s]."""
+ONE_STICKER = "one sticker moves"
+"""Motion without a force that may be a slow slip, or a sticker that came loose."""
+LIGHT_CHANGE = 0.05
+"""Share by which the brightness changes with the light."""
+REST_TIME = 0.3
+"""Time before and after a disturbance in which the places of the finger are compared [s]."""
+DOUBT_MARGIN = 0.25
+"""Time around a slip in which the finger may slide, too [s]: a sticker does not show the first
+hundredths of a millimetre."""
 
 
 class SeenSlip(NamedTuple):
@@ -63,6 +72,8 @@ class SeenSlip(NamedTuple):
         distance: slid, along the path [m].
         distance_error: its standard deviation [m].
         ratio: between the distance and the least one.
+        other: what moves or changes in the picture, if no force does: a slip only if it may be
+            that of `ONE_STICKER`.
     """
 
     onset: float
@@ -71,6 +82,41 @@ class SeenSlip(NamedTuple):
     distance: float
     distance_error: float
     ratio: float
+    other: str = ""
+
+
+class Film(NamedTuple):
+    """What a film shows beside the motion of fingertips on the object, on its regular grid.
+
+    Attributes:
+        levels: (n,) brightness.
+        places: (n_stickers, n, 2) of the stickers in the picture [pixels].
+    """
+
+    levels: Array
+    places: Array
+
+    @classmethod
+    def of(cls, grid: Array, times: Array, levels: Array, poses: Sequence[Array]) -> Self:
+        """Return what a film shows; where a sticker is not seen, it is between its places."""
+        places = []
+        for pose in poses:
+            seen = np.isfinite(pose[:, 0, 2])
+            known = [np.interp(grid, times[seen], pose[seen, k, 2]) for k in (0, 1)]
+            places.append(np.stack(known, axis=1))
+        return cls(np.interp(grid, times, levels), np.array(places))
+
+    def what_moves(self, rows: slice) -> str:
+        """Return what moves in a motion in which the force of no finger changes.
+
+        Args:
+            rows: pictures of the motion, at least one.
+        """
+        first, last = max(rows.start - 1, 0), min(rows.stop, len(self.levels) - 1)
+        if abs(self.levels[last] - self.levels[first]) > LIGHT_CHANGE * self.levels[first]:
+            return "the light changes"
+        ways = np.linalg.norm(self.places[:, last] - self.places[:, first], axis=1)
+        return "the whole picture moves" if ways.min() > ways.max() / 2 else ONE_STICKER
 
 
 def propose(
@@ -104,7 +150,7 @@ def propose(
     """
     rule = rule or VideoRule()
     how = fitting_tare(recording, tare)
-    flash = expected = None
+    flash = expected = film = None
     if motion is not None:
         source, kind = Path(motion), "motion"
         grid, moved = measured_motion(source, column)
@@ -115,8 +161,10 @@ def propose(
         if fps is None and stamps_path(source).exists():
             expected = -USUAL_DELAY  # the stamps are on the clock of the samples
         flash = flash_offset(recording, times, levels)
-        tips = tip_motions(times, poses, stickers_of(recording, bodies), rule, source)
+        bodies = stickers_of(recording, bodies)
+        tips = tip_motions(times, poses, bodies, rule, source)
         grid = regular_grid(times)
+        film = Film.of(grid, times, levels, [poses[k] for k in bodies.values() if k in poses])
     else:
         raise ValueError("neither a video nor a motion given")
     clock = (
@@ -137,11 +185,24 @@ def propose(
             stuck = held.copy()
             for slip in slips:
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
+        settled = np.all([label_states(own, at) == STABLE for own in base.values()], axis=0)
+        slips = [
+            slip._replace(other=film.what_moves(rows))
+            if film and settled[rows := slice(*np.searchsorted(at, (slip.onset, slip.end)))].all()
+            else slip
+            for slip in slips
+        ]
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
-        # What no picture shows is as doubtful as what the pictures show too little of.
-        doubtful = may_slide(rest, held, rule, n_samples_of(rule.window, grid[1] - grid[0]))
-        doubtful |= ~tip.seen
-        labels[finger] = without_cause(with_slips(base[finger], slips, note), at, doubtful)
+        # What no picture shows is as doubtful as what moves too little for a slip.
+        doubtful = ~tip.seen
+        for slip in slips:
+            doubtful |= (at > slip.onset - DOUBT_MARGIN) & (at < slip.end + DOUBT_MARGIN)
+        for label in base[finger]:
+            if label.cause is Cause.DISTURBANCE:
+                rows = slice(*np.searchsorted(at, (label.start, label.end)).tolist())
+                way = max(moved_by(rest, rows, n_samples_of(REST_TIME, grid[1] - grid[0])))
+                doubtful[rows] |= doubtful[rows].any() or way > 1e3 * rule.rest
+        labels[finger] = surely_held(with_slips(base[finger], slips, note), at, doubtful)
     return labels
 
 
@@ -248,26 +309,30 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
     return slips
 
 
-def may_slide(rest: Array, held: Mask, rule: VideoRule, n: int) -> Mask:
-    """Return where so much motion remains that a slip is possible, too small to be found.
+def moved_by(rest: Array, rows: slice, n: int) -> tuple[float, float]:
+    """Return how far a finger is elsewhere after some time, and half of its way within it [mm].
+
+    What the force does not explain of the way is larger within a push than after it.
 
     Args:
         rest: (n, 2) from `unexplained` [mm].
-        held: (n,) where the finger holds the object.
-        rule: thresholds.
-        n: values on either side of a step.
+        rows: of the time; it may be empty.
+        n: values before and after it that are compared.
     """
-    moved, noise = _steps(rest, held, n)
-    # Half of the least step of a slip, with half of its margin over the noise.
-    least = max(1e3 * rule.step / 2, 2.95 * noise)
-    return hysteresis(np.where(held, moved / least, 0.0), 0.7, 1.0)
+    before = rest[max(rows.start - n, 0) : rows.start]
+    after, within = rest[rows.stop : rows.stop + n], mean_over(rest[rows], 3)
+    if not (len(before) and len(after) and len(within)):
+        return math.inf, math.inf
+    place = np.median(before, axis=0)
+    largest = np.linalg.norm(within - place, axis=1).max()
+    return float(np.linalg.norm(np.median(after, axis=0) - place)), float(largest) / 2
 
 
-def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
-    """Return labels whose disturbances have no cause where the finger may slide.
+def surely_held(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
+    """Return labels that call no time held in which the finger may slide.
 
-    A disturbance trains and scores the head `slip` as no slip. What is unstable without a cause is
-    neither.
+    A disturbance, and a stable contact, train and score the head `slip` as no slip. What is
+    unstable without a cause, or has no label, is neither.
 
     Args:
         labels: of one finger.
@@ -278,11 +343,15 @@ def without_cause(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tu
     spans = [(-math.inf, float(times[0])), *inside, (float(times[-1]), math.inf)]
     made: list[Label] = []
     for label in labels:
-        if label.cause is Cause.DISTURBANCE:
-            parts = _cut(label, spans)
-            made += [part if span is None else replace(part, cause=None) for part, span in parts]
-        else:
+        is_stable = label.state is ContactState.STABLE
+        if not is_stable and label.cause is not Cause.DISTURBANCE:
             made.append(label)
+            continue
+        for part, span in _cut(label, spans):
+            if span is None:
+                made.append(part)
+            elif not is_stable:
+                made.append(replace(part, cause=None))
     return tuple(made)
 
 
@@ -360,18 +429,19 @@ def with_slips(
                 made.append(part)
                 continue
             slip, start = slips[index], part.start
+            doubt = f"no force changes, {slip.other}; " if slip.other else ""
             text = (
                 f"slides {1e3 * slip.distance:.2f} mm (+/- {1e3 * slip.distance_error:.2f}), "
-                f"onset +/- {1e3 * slip.onset_error:.0f} ms; {note}"
+                f"onset +/- {1e3 * slip.onset_error:.0f} ms; {doubt}{note}"
             )
             if made and made[-1].evidence == text:  # it goes on over an edge of the labels
                 start = made.pop().start
             # A slip of the least distance has an evidence ratio of 2, a confidence up to 0.75.
             ratio = float(evidence_ratio(slip.ratio, 0.5))
             sure = round(label_confidence(ratio, part.end - start), 3)
-            made.append(
-                Label(start, part.end, ContactState.UNSTABLE, Cause.SLIP, text, sure, VIDEO_RULE)
-            )
+            cause = Cause.SLIP if slip.other in ("", ONE_STICKER) else None
+            state = ContactState.UNSTABLE
+            made.append(Label(start, part.end, state, cause, text, sure, VIDEO_RULE))
     return tuple(made)
 
 

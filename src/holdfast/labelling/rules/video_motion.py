@@ -46,6 +46,8 @@ class VideoRule:
         step: least difference of the two where something may slide [m]; at least six times noise.
         slid: least distance between the positions before and after a slip [m].
         before: time before a slip that is fitted as stuck [s].
+        rest: greatest distance between the positions before and after a disturbance in which
+            surely nothing slides [m]; within it the finger may be twice as far away.
     """
 
     object_size: float = 0.024
@@ -54,6 +56,7 @@ class VideoRule:
     step: float = 0.00012
     slid: float = 0.0002
     before: float = 0.2
+    rest: float = 0.00008
 
     def __post_init__(self) -> None:
         check_positive(self)
