@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import stats
 
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
@@ -154,6 +155,11 @@ class TestThresholds:
         assert slip_intervals(self.curves[:1]) is None
 
 
+def limit(n):
+    """Upper end of the interval of a Poisson number, exceeded in a fifth of the cases."""
+    return float(stats.gamma.ppf(0.8, n + 1))
+
+
 def in_use(curve, rate):
     return choose_threshold(curve, ThresholdChoice(rate, "use"))
 
@@ -172,22 +178,18 @@ class TestRateInUse:
             raised_seconds=np.zeros(n), false_impacts=np.zeros(n, dtype=np.int64),
         )  # fmt: skip
 
-    def test_disturbed_time_counts_with_its_own_share_below_that_of_use(self):
-        # 9 + 3 false alarms in 8 minutes.
-        curve = self.curve(9.0, 3.0, 6.0, 2.0)
-        assert [in_use(curve, rate) for rate in (1.5, 1.4)] == [0, 1]
-        assert [choose_threshold(curve, ThresholdChoice(rate)) for rate in (1.5, 1.4)] == [0, 1]
-
-    def test_disturbed_time_counts_with_the_share_of_use_above_it(self):
-        # 0.6 * 2 / 2 + 0.4 * 16 / 8 = 1.4 a minute; all held time has 1.8.
-        curve = self.curve(2.0, 16.0, 2.0, 8.0)
-        assert [in_use(curve, rate) for rate in (1.4, 1.3, 0.6)] == [0, 1, 2]
-        assert choose_threshold(curve, ThresholdChoice(1.4)) == 1
+    @pytest.mark.parametrize("counts", [(9.0, 3.0, 6.0, 2.0), (2.0, 16.0, 2.0, 8.0)])
+    def test_quiet_and_disturbed_time_count_with_their_shares_of_use(self, counts):
+        quiet, disturbed, *minutes = counts
+        rate = 0.6 * quiet / minutes[0] + 0.4 * disturbed / minutes[1]
+        rate += (limit(quiet + disturbed) - quiet - disturbed) / sum(minutes)
+        curve = self.curve(*counts)
+        assert [in_use(curve, 1.001 * rate), in_use(curve, 0.999 * rate)] == [0, 1]
 
     @pytest.mark.parametrize("minutes", [(10.0, 0.0), (0.0, 10.0)])
     def test_only_one_of_the_two_counts_alone(self, minutes):
         curve = self.curve(20.0 * (minutes[0] > 0), 20.0 * (minutes[1] > 0), *minutes)
-        assert [in_use(curve, rate) for rate in (2.0, 1.9)] == [0, 1]
+        assert [in_use(curve, rate * limit(20.0) / 10) for rate in (1.001, 0.999)] == [0, 1]
 
     def test_what_is_raised_in_quiet_hold_stays_under_two_percent(self):
         curve = self.curve(0.0, 0.0)
@@ -211,11 +213,12 @@ class TestRateInUse:
         curve = replace(curve, false_quiet=quiet, false_held=quiet + disturbed)
         expected = None
         for k in reversed(range(len(curve))):
-            share = min(minutes[1] / sum(minutes), 0.4) if minutes[0] else 1.0
+            share = 0.4 if minutes[0] else 1.0
             found = share * disturbed[k] / minutes[1]
             if minutes[0]:
                 found += (1 - share) * quiet[k] / minutes[0]
-            if found > rate:
+            n = quiet[k] + disturbed[k]
+            if found + (limit(n) - n) / sum(minutes) > rate:
                 break
             expected = k
         assert in_use(curve, rate) == expected

@@ -8,7 +8,7 @@ import pytest
 from holdfast import teach
 from holdfast.contact import Cause, ContactState
 from holdfast.detection import Model
-from holdfast.detection.specs import TAUGHT_FEATURES
+from holdfast.detection.specs import SLIDING_FEATURES
 from holdfast.errors import TrainingError
 from holdfast.io import load_dataset, save_recording
 from holdfast.parallel import Engine
@@ -55,7 +55,7 @@ class TestModel:
         assert after.stable == before.stable
         assert after.head("cause") == before.head("cause")
         assert after.head("slip_speed") is None
-        assert after.slip.features == TAUGHT_FEATURES
+        assert {*after.slip.features} <= {*SLIDING_FEATURES}
         assert taught.model.name == "builtin:any, taught"
 
     def test_it_keeps_its_record_in_the_file(self, taught, tmp_path):
@@ -124,13 +124,14 @@ class TestFigures:
         assert taught.base.pooled.n == taught.slips.pooled.n == 48
 
     def test_few_slips_and_few_recordings_are_said(self, recordings):
-        few = teach_with_report(BASE, recordings[:2], false_alarms=20.0)
+        few = teach_with_report(BASE, recordings[:2], false_alarms=60.0)
         assert len(few.warnings) == 1
 
     def test_held_time_that_is_too_short_for_the_rate_is_said(self, recordings):
         short = teach_with_report(BASE, recordings[:2], false_alarms=0.3)
         (warning,) = short.warnings[1:]
-        assert f"{short.slips.pooled.held_minutes:.2g} min of held time" in warning
+        assert f"{short.slips.pooled.held_minutes:.2g} were seen" in warning
+        assert "30 minutes of hold with pushes" in warning
 
 
 def _turned(recording):

@@ -26,11 +26,11 @@ def pulled():
     return perform(CAN, "pull", 3, 9.0)
 
 
-def test_a_pull_slides_and_a_nudge_slides_less(pulled):
-    nudged = perform(CAN, "nudge", 2, 8.0)
+def test_a_pull_slides_and_a_touch_slides_less(pulled):
+    touched = perform(CAN, "touch", 4, 9.0)
     assert [x["kind"] for x in pulled.metadata["slip_events"]][:2] == ["creep", "twist"]
-    assert n_slips(pulled) > n_slips(nudged)
-    assert Phase.DISTURBED in nudged.truth.hand["phase"]
+    assert n_slips(pulled) > n_slips(touched)
+    assert Phase.DISTURBED in touched.truth.hand["phase"]
 
 
 def test_a_script_keeps_to_its_time(pulled):
@@ -42,7 +42,7 @@ def test_a_script_keeps_to_its_time(pulled):
 
 
 def test_an_arm_that_carries_changes_the_force():
-    held, carried = perform(CAN, "hold", 0, 8.0), perform(CAN, "carry", 2, 8.0)
+    held, carried = perform(CAN, "touch", 0, 8.0), perform(CAN, "carry", 2, 8.0)
     assert held.metadata["slip_events"] == carried.metadata["slip_events"] == []
     spread = []
     for recording in (held, carried):
@@ -52,7 +52,7 @@ def test_an_arm_that_carries_changes_the_force():
     assert spread[1] > 2 * spread[0]
 
 
-def test_a_tool_knocks_once_in_each_part_of_the_time(monkeypatch):
+def test_knocks_and_pushes_take_turns(monkeypatch):
     plans = []
 
     class Watched(Simulation):
@@ -61,7 +61,9 @@ def test_a_tool_knocks_once_in_each_part_of_the_time(monkeypatch):
             super().__init__(grasp, plan=plan, loads=loads)
 
     monkeypatch.setattr(scripted, "Simulation", Watched)
-    recording = perform(CAN, "knock", 3, 10.0)
+    recording = perform(CAN, "touch", 3, 10.0)
     assert recording.metadata["case"] == "1"
     starts = [impact.start for impact in plans[-1].impacts]
-    assert [int((start - scripted.FIRST_ACTION) / 2.0) for start in starts] == [0, 1, 2]
+    starts = (starts, [push.start for push in plans[-1].disturbances])
+    parts = [[int((x - scripted.FIRST_ACTION) / 2.0) for x in own] for own in starts]
+    assert parts == [[0, 2], [1]]

@@ -277,19 +277,6 @@ SLIP_FEATURES = (
 """Features of the slip rule of `builtin:twin`."""
 
 
-TAUGHT_SPACINGS = (0.0067, 0.0133, 0.0267, 0.0533)
-"""Spacings of second differences of a taught head: one to eight samples at 150 Hz [s]."""
-
-TAUGHT_FEATURES = (
-    *ANY_FEATURES,
-    *_relative("second", TAUGHT_SPACINGS),
-    *_relative("mean_second", TAUGHT_SPACINGS[:2]),
-    *_relative("ratio", SLIP_LAGS),
-)
-"""Features of a head that is taught by slips of the user's own hand: every family without a unit.
-The lags of `any` are among them, because the model that keeps its other heads computes those."""
-
-
 SLIDING_LAGS = (0.014, 0.03, 0.067, 0.133, 0.267, 0.533)
 """Lags of changes in features of sliding [s]; the first is the spacing of fast changes, too."""
 _SLIDING = kinds_of("sliding")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from holdfast.contact import MERGE_GAP, UNSTABLE_MARGIN, Cause, ContactState
+from holdfast.contact import MERGE_GAP, UNSTABLE_MARGIN, Cause
 from holdfast.errors import RecordingError
 from holdfast.files import write_whole
 from holdfast.io import load_recording
@@ -181,15 +181,9 @@ def _is_slip(label: Label) -> bool:
 
 
 def _by_step(label: Label, step: Step) -> Label:
-    """Return a label of the force alone, for a step in which nothing slides.
-
-    Movements that are part of the step are no slips. Another movement may be one.
-    """
-    cause = label.cause
-    if label.state is ContactState.UNSTABLE and cause is Cause.DISTURBANCE and not step.n_actions:
-        cause = None
+    """Return a label of the force alone, for a step in which nothing slides."""
     evidence = f"{label.evidence}; step {step.name} of the protocol: nothing slides"
-    return replace(label, cause=cause, evidence=evidence, author=TEACH_AUTHOR)
+    return replace(label, evidence=evidence, author=TEACH_AUTHOR)
 
 
 def _save(recording: Recording, labels: Mapping[str, Sequence[Label]], path: Path) -> None:

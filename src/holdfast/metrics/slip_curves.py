@@ -33,10 +33,11 @@ SLIP_THRESHOLD_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
 
-MAX_DISTURBED_SHARE = 0.4
-"""Maximum share of held time in which something pushes or moves the object, when a rate of false
-alarms is taken from grasps that were made to teach: an assumption, near the share in the paper's
-experiment."""
+DISTURBED_SHARE = 0.4
+"""Share of held time in which something pushes or moves the object in use: an assumption, near the
+share in the paper's experiment."""
+UPPER_DEVIATION = 0.84
+"""Standard deviations of the upper end of an interval above which are 20 %."""
 
 MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
@@ -101,13 +102,13 @@ class ThresholdChoice:
     `MAX_RAISED_QUIET` of quiet hold, so long as every higher one fits, too: a lucky low threshold
     below a bad one is not taken.
 
-    Grasps that are made to teach have more pushes than use has. So where more than s = 0.4 of
-    their held time is disturbed, the rate of false alarms in `use` weights the rates of quiet and
-    of disturbed time:
+    What is surely held of labelled grasps is disturbed for another share of its time than use is,
+    s = 0.4. So the rate of false alarms in `use` weights the rates of quiet and of disturbed time,
+    and the upper end of its interval, which is exceeded in one case of five, counts:
 
-        rate = (1 - s) rate_quiet + s rate_disturbed
+        rate = (1 - s) rate_quiet + s rate_disturbed + (limit(n) - n) / time
 
-    The rate itself counts, no bound above it: docs/teach.md has both.
+    with the limit of a Poisson number n (Wilson and Hilferty).
 
     Attributes:
         false_alarms: maximum number per minute, of one finger.
@@ -170,17 +171,24 @@ def _lowest(ratios: Ratios, choice: ThresholdChoice, draws: Array) -> Integers:
     if choice.counted_in == "quiet":
         n, seconds = n_quiet, quiet
     elif choice.counted_in == "use":
-        share, disturbed = MAX_DISTURBED_SHARE, seconds - quiet
-        weighted = (1 - share) * n_quiet * disturbed + share * (n - n_quiet) * quiet
-        is_excess = (disturbed > share * seconds) & (quiet > 0)
-        n = np.where(is_excess, weighted, n)
-        seconds = np.where(is_excess, quiet * disturbed, seconds)
+        share, disturbed = DISTURBED_SHARE, seconds - quiet
+        more = 60 * _poisson_limit(n / 60) - n
+        has_both = (quiet > 0) & (disturbed > 0)
+        weights = (1 - share) * n_quiet * disturbed + share * (n - n_quiet) * quiet
+        in_use = np.divide(weights * seconds, quiet * disturbed, out=np.array(n), where=has_both)
+        n = in_use + more
     # Without held time the rate is not known, so no threshold fits; without quiet hold nothing can
     # be raised in it.
     few = (n <= choice.false_alarms * seconds) & (seconds > 0)
     fits = few & (raised <= MAX_RAISED_QUIET * quiet)
     unbroken = np.logical_and.accumulate(fits[:, ::-1], axis=1)  # from the highest on
     return np.asarray(fits.shape[1] - unbroken.sum(axis=1))
+
+
+def _poisson_limit(n: Array) -> Array:
+    """Return the upper limits of the means of Poisson numbers, within 1 %."""
+    root = np.sqrt(n + 1.0)
+    return np.asarray((n + 1.0) * (1 - 1 / (9 * root**2) + UPPER_DEVIATION / (3 * root)) ** 3)
 
 
 def held_out_indices(

@@ -229,7 +229,7 @@ def slip_truth(
             codes[rows] = STILL if is_stable or label.cause is not None else CREEPING
         unlabelled[rows] = False
     for first, last in runs(unlabelled).tolist():
-        if 0 < first and last < len(times) and NOT_HELD not in codes[[first - 1, last]]:
+        if first > 0 and last < len(times) and NOT_HELD not in codes[[first - 1, last]]:
             codes[first:last] = CREEPING
     if truth is not None and has_slip_truth(truth, finger):
         index = np.clip(np.searchsorted(truth.times, times, side="right") - 1, 0, None)

@@ -18,8 +18,9 @@ import numpy as np
 from holdfast.blocks import Digests
 from holdfast.detection import ANY_FINGER, Head, Model, Training
 from holdfast.detection.features import extract
+from holdfast.detection.heads import Linear
 from holdfast.detection.plan import StreamPlan, Tare
-from holdfast.detection.specs import TAUGHT_FEATURES
+from holdfast.detection.specs import SLIDING_CHOICE, SLIDING_FEATURES, FeatureSpec
 from holdfast.errors import TrainingError
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
@@ -46,9 +47,14 @@ from holdfast.training.thresholds import N_SHOWN, CurvePoint
 
 WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
-TAUGHT_C = 0.1
-"""C of the fit, a tenth of that of a model of many recordings: 140 weights have some tens of slips.
-docs/teach.md has what it is worth."""
+FEW_C, TAUGHT_C = 0.01, 0.1
+"""C of the fit below `FEW_GRASPS` recordings with slips, and from there on: a tenth of that of a
+model of many recordings, since 100 to 200 weights have some tens of slips."""
+FEW_GRASPS = 4
+"""Number of recordings with slips from which they carry the weights of `TAUGHT_C`."""
+LOG_ODDS_SHIFT = -2.0
+"""Shift of the log odds of what slides, as likely as what is still, that keeps the thresholds with
+few false alarms inside of `SLIP_THRESHOLDS`."""
 MIN_SLIPS, FEW_SLIPS = 3, 10
 """Slips of fingers below which nothing is fitted, and below which the user is warned."""
 MIN_SLIDING = 20
@@ -56,6 +62,9 @@ MIN_SLIDING = 20
 MIN_TAUGHT_RECORDINGS, FEW_RECORDINGS = 2, 5
 """Recordings with slips below which nothing is scored, and recordings below which the user is
 warned: a fold then leaves out a large part of the slips."""
+SURE_ALARMS = 9
+"""Number of false alarms, at the wanted rate in what was surely held, from which the rate is known
+to a third: the standard deviation of a number n is its root."""
 TAUGHT_SUFFIX = ", taught"
 """End of the name of a taught model."""
 TRUTH_AUTHOR = "twin"
@@ -68,6 +77,30 @@ together."""
 SHOWN_FALSE_ALARMS = (0.5, 1.0, 1.5, 3.0, 6.0)
 """Wanted false alarms per minute of a finger, beside that of the model, whose thresholds are shown:
 the user moves along them by the option `--false-alarms`."""
+
+
+class FeatureSet(NamedTuple):
+    """Features to which a head may be fitted: the more, the more slips they need.
+
+    Attributes:
+        name: for the user.
+        features: among `SLIDING_FEATURES`.
+        squares: whether their squares are features, too.
+        has_prior: whether the log odds of other hands are one more feature.
+    """
+
+    name: str
+    features: tuple[FeatureSpec, ...]
+    squares: bool = False
+    has_prior: bool = False
+
+
+FEATURE_SETS = (
+    FeatureSet("few features and the prior of other hands", SLIDING_CHOICE, has_prior=True),
+    FeatureSet("all features", SLIDING_FEATURES),
+    FeatureSet("all features with squares", SLIDING_FEATURES, squares=True),
+)
+"""Sets among which `teach` chooses, by what they find out of fold."""
 
 
 class TaughtPoint(msgspec.Struct, frozen=True):
@@ -102,6 +135,7 @@ class Taught:
         hand_alarms: false alarms of all fingers per minute in which the hand holds.
         curve: what other thresholds give.
         n_recordings: number of recordings with known slips.
+        features: name of the set of features that found most.
         warnings: for the user.
     """
 
@@ -111,6 +145,7 @@ class Taught:
     hand_alarms: float
     curve: tuple[TaughtPoint, ...]
     n_recordings: int
+    features: str
     warnings: tuple[str, ...]
 
     @property
@@ -145,6 +180,7 @@ class Taught:
             "base": None if self.base is None else self.base.pooled,
             "hand_false_alarms_per_minute": self.hand_alarms,
             "curve": self.curve,
+            "features": self.features,
             "warnings": self.warnings,
             "verdict": self.verdict,
         }
@@ -170,8 +206,11 @@ class TaughtPart(NamedTuple):
     n_slips: int
 
 
-FoldScores = list[tuple[Mapping[str, SlipCounts], Mapping[str, SlipCounts]]]
-"""Of each recording of a fold: counts of the taught head at each threshold, and of the base."""
+Curves = Sequence[Mapping[str, SlipCounts]]
+"""Counts at each threshold of the fingers of recordings."""
+FoldScores = list[tuple[Curves, Mapping[str, SlipCounts]]]
+"""Of each recording of a fold: counts at each threshold of the head of each set of features, and
+those of the base."""
 
 
 def teach(
@@ -233,15 +272,21 @@ def teach_with_report(
     base = _base_of(model, list(parts.values()))
 
     # A head that is scored on a recording was fitted without it, and without those of its fold.
-    n_folds = min(len(parts), MAX_TAUGHT_FOLDS)
+    prior, n_folds = _prior_of(model), min(len(parts), MAX_TAUGHT_FOLDS)
+    sets = [x for x in FEATURE_SETS if prior is not None or not x.has_prior]
     folds = [list(parts)[fold::n_folds] for fold in range(n_folds)]
     tasks = ((fold, [OneRecording(recordings, k) for k in fold]) for fold in folds)
-    scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples))
+    scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples, sets, prior))
     scores = [pair for fold in progress(scored, "fitting", n_folds) for pair in fold]
-    curves, counts_of_base = [curves for curves, _ in scores], [counts for _, counts in scores]
+    counts_of_base = [counts for _, counts in scores]
+    by_set = [[curves[k] for curves, _ in scores] for k in range(len(sets))]
+    best = max(range(len(sets)), key=lambda k: _mean_found(by_set[k]))
+    curves, feature_set = by_set[best], sets[best]
     pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
     total = SlipCounts.total(pooled)
     index = choose_threshold(total, ThresholdChoice(false_alarms, "use"))
+    if index is None:  # too little is held for the upper end of the interval
+        index = choose_threshold(total, ThresholdChoice(false_alarms))
     if index is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
@@ -252,12 +297,12 @@ def teach_with_report(
         [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
         slip_intervals([curve[index].as_curve for curve in pooled], seed=seed),
     )
-    head = _fitted(samples, ())
+    head = _fitted(samples, (), feature_set, prior)
     shown = range(max(index - N_SHOWN, 0), min(index + N_SHOWN + 1, len(total)))
     points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), total[k]) for k in shown]
     chosen = points[index - shown.start]
     head = head.at(chosen.threshold, chosen.choice(false_alarms, points=points))
-    taught = base.changed(lambda part: part.with_heads(head))
+    taught = _with_head(base, head)
     record = Training(
         recordings={part.name: part.digest for part in parts.values()},
         split="recording",
@@ -274,6 +319,7 @@ def teach_with_report(
         _hand_alarms(curves, index),
         tuple(_curve_points(curves, total, {*SHOWN_FALSE_ALARMS, false_alarms})),
         len(parts),
+        feature_set.name,
         tuple(_warnings(len(parts), total[index], false_alarms)),
     )
 
@@ -311,7 +357,7 @@ def _read_part(model: Model, index: int, part: Sequence[Recording]) -> TaughtPar
     }
     known = {name: sensors[name] for name in truths}
     plan = StreamPlan(
-        known, dict.fromkeys(known, TAUGHT_FEATURES), model.window, Tare.parse(model.tare),
+        known, dict.fromkeys(known, SLIDING_FEATURES), model.window, Tare.parse(model.tare),
         recording.rate,
     )  # fmt: skip
     samples = []
@@ -368,42 +414,76 @@ def _base_of(model: Model, parts: Sequence[TaughtPart]) -> Model:
     )
 
 
-def _fitted(samples: TargetSamples, left_out: Collection[int]) -> Head:
+def _prior_of(model: Model) -> Linear | None:
+    """Return the rule of the slips of other hands; None without one on `SLIDING_CHOICE`."""
+    heads = {part.slip for part in model.fingers.values()}
+    head = heads.pop() if len(heads) == 1 else None
+    if head is None or head.features != SLIDING_CHOICE or head.rule.squares:
+        return None
+    return head.rule
+
+
+def _mean_found(curves: Curves) -> float:
+    """Return the share of slips found within 0.1 s, over the thresholds for several rates [%]."""
+    total = SlipCounts.total([curve for fingers in curves for curve in fingers.values()])
+    return math.fsum(
+        point.found or 0.0 for point in _curve_points(curves, total, SHOWN_FALSE_ALARMS)
+    )
+
+
+def _fitted(
+    samples: TargetSamples,
+    left_out: Collection[int],
+    feature_set: FeatureSet,
+    prior: Linear | None,
+) -> Head:
     """Fit the head to the samples of all recordings but some.
 
     Raises:
         TrainingError: nothing that slides, or nothing that holds still, is left.
     """
+    columns = [SLIDING_FEATURES.index(spec) for spec in feature_set.features]
+    # Those left out count, too: another penalty would give their head other scores.
+    n_grasps = len(np.unique(samples.recordings[np.asarray(samples.values) != 0]))
     head = fit_slip(
-        samples, left_out, TAUGHT_FEATURES, is_any=False, squares=True, n_min=1, c=TAUGHT_C
-    )
+        replace(samples, features=samples.features[:, columns]), left_out, feature_set.features,
+        is_any=False, squares=feature_set.squares, n_min=1,
+        c=FEW_C if n_grasps < FEW_GRASPS else TAUGHT_C,
+        prior=prior if feature_set.has_prior else None,
+    )  # fmt: skip
     if head is None:
         raise TrainingError(
             "without one of the recordings no slip is left; slips in at least three of them "
             "expected"
         )
-    # Each fit with its own odds, so that the thresholds of the folds mean the same: with few slips
-    # the probabilities would leave the grid of thresholds, whose lowest is 0.018.
-    odds = math.log((samples.n_usable - samples.n_positive) / samples.n_positive)
+    # Each fit with its own odds, so that the thresholds of the folds mean the same.
+    odds = math.log((samples.n_usable - samples.n_positive) / samples.n_positive) + LOG_ODDS_SHIFT
     rule = msgspec.structs.replace(head.rule, offset=head.rule.offset + odds)
     return msgspec.structs.replace(head, rule=rule)
+
+
+def _with_head(model: Model, head: Head) -> Model:
+    return model.changed(lambda part: part.with_heads(head))
 
 
 def _score_fold(
     base: Model,
     given: Model,
     samples: TargetSamples,
+    sets: Sequence[FeatureSet],
+    prior: Linear | None,
     fold: Collection[int],
     parts: Sequence[Sequence[Recording]],
 ) -> FoldScores:
-    """Return the counts about each recording of a fold, of a head that was fitted without them."""
-    head = _fitted(samples, fold)
-    model = base.changed(lambda part: part.with_heads(head))
+    """Return the counts about each recording of a fold, of heads that were fitted without them."""
+    heads = [_fitted(samples, fold, feature_set, prior) for feature_set in sets]
+    models = [_with_head(base, head) for head in heads]
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        taught, base_slips = (compute_decisions(m, recording).known_slips for m in (model, given))
-        curves = {name: slip_curve(slips) for name, slips in taught.items()}
+        taught = [compute_decisions(model, recording).known_slips for model in models]
+        curves = [{name: slip_curve(slips) for name, slips in known.items()} for known in taught]
+        base_slips = compute_decisions(given, recording).known_slips
         counts = {name: count_slips(slips) for name, slips in base_slips.items()}
         scores.append((curves, counts))
     return scores
@@ -440,8 +520,8 @@ def _warnings(n_recordings: int, counts: SlipCounts, false_alarms: float) -> Ite
             f"{n_recordings} recordings given: the figures out of fold are rough below "
             f"{FEW_RECORDINGS}"
         )
-    if minutes * false_alarms < 1:
+    if minutes < (needed := SURE_ALARMS / false_alarms):
         yield (
-            f"{minutes:.2g} min of held time given: whether it gives at most {false_alarms:g} "
-            f"false alarms a minute cannot be known below {1 / false_alarms:.2g} min"
+            f"{false_alarms:g} a minute needs {needed:.2g} minutes of hold with pushes: "
+            f"{minutes:.2g} were seen, so the next grasps may have more false alarms"
         )

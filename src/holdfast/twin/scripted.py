@@ -11,10 +11,10 @@ from holdfast.recordings import Recording
 from holdfast.twin.impacts import draw_impacts
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.operator import PUSH_DIRECTIONS, Disturbance, draw_disturbance
-from holdfast.twin.profile import GRASP_ATTEMPTS, Span, profile
+from holdfast.twin.profile import GRASP_ATTEMPTS, profile
 from holdfast.twin.simulation import RETRY_DEPTH_FACTOR, Grasp, Simulation, draw_plan
 from holdfast.twin.slip_events import SlipEvent, SlipKind, draw_slip_event
-from holdfast.twin.steps import JERK, PUSH
+from holdfast.twin.steps import PUSH
 
 SCRIPT_PROFILE = "slips"
 """Profile of fingers and slip events of these grasps: its fingers are those of `reference`."""
@@ -39,16 +39,15 @@ class Script(NamedTuple):
         kinds: slip events, in turn.
         disturbed_as: profile from which disturbances are drawn; empty for none.
         style: of the disturbances; None as drawn.
-        duration: of the disturbances [s]; None as drawn.
         depth: factor of their depth.
-        struck_as: profile from which impacts are drawn; empty for none.
+        struck_as: profile from which impacts are drawn, which take turns with the disturbances;
+            empty for none.
         carried: whether the arm moves the hand.
     """
 
     kinds: tuple[SlipKind, ...] = ()
     disturbed_as: str = ""
     style: int | None = None
-    duration: Span | None = None
     depth: float = 1.0
     struck_as: str = ""
     carried: bool = False
@@ -56,13 +55,10 @@ class Script(NamedTuple):
 
 SCRIPTS = {
     "open": None,
-    "hold": Script(),
     "carry": Script(carried=True),
     "pull": Script(kinds=(SlipKind.CREEP, SlipKind.TWIST, SlipKind.TURN)),
     "push": Script(disturbed_as="reference"),
-    "tap": Script(disturbed_as="gentle", style=JERK, duration=(0.15, 0.3), depth=0.5),
-    "knock": Script(struck_as="coupled"),
-    "nudge": Script(disturbed_as="gentle", style=PUSH, depth=0.5),
+    "touch": Script(disturbed_as="gentle", style=PUSH, depth=0.5, struck_as="coupled"),
 }
 """Course of the grasp of each step, by its name; None is an open hand. Fixed before the first
 model was taught by them."""
@@ -115,12 +111,13 @@ def _simulation(grasp: Grasp, script: Script | None, n_actions: int, seconds: fl
         moved = draw_disturbance(generator, moving, FIRST_MOVE, "left", scale)
         longest = FIRST_ACTION - FIRST_MOVE - MIN_REST
         disturbances.append(moved._replace(duration=min(moved.duration, longest)))
-    parts = np.linspace(FIRST_ACTION, seconds - LAST_ACTION, n_actions + 1).tolist()
+    ends = np.linspace(FIRST_ACTION, seconds - LAST_ACTION, n_actions + 1).tolist()
+    spans = list(pairwise(ends))
     if script.struck_as and (ranges := profile(script.struck_as).impacts) is not None:
         always = msgspec.structs.replace(ranges, share=1.0)
-        impacts = draw_impacts(generator, always, list(pairwise(parts)))
-        return Simulation(grasp, plan=plan._replace(impacts=impacts))
-    for k, (begin, end) in enumerate(pairwise(parts)):
+        plan = plan._replace(impacts=draw_impacts(generator, always, spans[::2]))
+        spans = spans[1::2]
+    for k, (begin, end) in enumerate(spans):
         start = begin + SPREAD_START * (end - begin) * float(generator.random())
         room = max(end - start - MIN_REST, MIN_ACTION)
         if script.kinds and chosen.slips is not None:
@@ -150,6 +147,4 @@ def _disturbance(
     drawn = draw_disturbance(
         generator, profile(script.disturbed_as), start, direction, scale * script.depth
     )
-    if script.duration is not None:
-        drawn = drawn._replace(duration=float(generator.uniform(*script.duration)))
     return drawn if script.style is None else drawn._replace(style=script.style)

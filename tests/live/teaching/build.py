@@ -68,5 +68,5 @@ class Feeder:
 
 
 HEALTH = step(Check.HEALTH, "open")
-HOLD = step(Check.STILL)
+HOLD = step(Check.FELT)
 PULL = step(Check.SLID, "pull", n_actions=4, n_grasps=2)

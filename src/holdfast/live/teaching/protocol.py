@@ -38,8 +38,6 @@ MAX_STAGE_SECONDS = 60.0
 """Time for which an open hand, or a grasp, is awaited [s]."""
 MIN_HELD_SHARE = 0.6
 """Share of the time of a step for which the object must be held."""
-MAX_UNSTABLE_SHARE = 0.5
-"""Share of a still hold that may be UNSTABLE."""
 MIN_CARRIED_CHANGE, CHANGE_SECONDS = 0.05, 0.5
 """Change of a finger's force within half a second [s] that an arm which carries exceeds at times,
 as a share of the force; a hand that rests stays below half of it."""
@@ -272,9 +270,9 @@ class GuidedProtocol:
             self.step, self.number = self._left[-1]
         self._began, self._since, self._recording = self._now, math.nan, ""
         self._samples: dict[str, list[tuple[float, Array]]] = {n: [] for n in self._sensors}
-        # Of what happens in ACT: time of holding, and of that UNSTABLE [s]; number of movements
-        # and when the last one ended; forces.
-        self._held = self._unstable = 0.0
+        # Of what happens in ACT: time of holding [s]; number of movements, and when the last one
+        # ended; forces.
+        self._held = 0.0
         self._n_felt, self._moved_at = 0, -math.inf
         self._forces: list[dict[str, tuple[float, float, float]]] = []
 
@@ -357,7 +355,6 @@ class GuidedProtocol:
         self._held += since_last
         self._forces.append({name: finger.force for name, finger in touched.items()})
         if any(finger.state is ContactState.UNSTABLE for finger in touched.values()):
-            self._unstable += since_last
             self._n_felt += self._now - self._moved_at > MERGE_GAP
             self._moved_at = self._now
 
@@ -382,11 +379,6 @@ class GuidedProtocol:
             return False, f"held for {self._held:.0f} s only, {step.seconds:.0f} s expected"
         good, bad = f"held for {self._held:.0f} s", ""
         match step.check:
-            case Check.STILL:
-                rest = 100 * (1 - self._unstable / self._held)
-                good += f", at rest for {rest:.0f} % of it"
-                if rest < 100 * (1 - MAX_UNSTABLE_SHARE):
-                    bad = f"at rest for {rest:.0f} % of the time only: hold it still"
             case Check.CARRIED:
                 change = self._largest_change()
                 good += f", the force changed by {100 * change:.0f} %"

@@ -7,13 +7,11 @@ from typing import NamedTuple
 class Check(StrEnum):
     """Check of a step, as soon as it is over.
 
-    HEALTH: nothing touches the open hand, and its taxels are healthy. STILL: the object was held
-    and rested. CARRIED: it was held, and the force changed. FELT: it was held, and movements were
-    felt. SLID: a camera saw slips.
+    HEALTH: nothing touches the open hand, and its taxels are healthy. CARRIED: the object was held,
+    and the force changed. FELT: it was held, and movements were felt. SLID: a camera saw slips.
     """
 
     HEALTH = "health"
-    STILL = "still"
     CARRIED = "carried"
     FELT = "felt"
     SLID = "slid"
@@ -54,25 +52,22 @@ STEPS = (
         Check.HEALTH, 10.0, in_view=False,
     ),
     Step(
-        "hold", "GRASP, AND HOLD STILL", "Nobody touches hand or object.",
-        Check.STILL, 20.0, in_view=False,
-    ),
-    Step(
         "carry", "CARRY AND TURN IT", "Move as in your task, as fast as in it. Nothing may slide.",
         Check.CARRIED, 30.0, n_actions=12, in_view=False,
     ),
     Step(
         "pull", "PULL UNTIL IT SLIDES", "Move it to and fro first. Then pull or turn it, and rest.",
-        Check.SLID, 30.0, n_actions=6, n_grasps=3,
+        Check.SLID, 30.0, n_actions=6, n_grasps=2,
     ),
     Step(
         "push", "PUSH UNTIL IT SLIDES", "From all sides; let it rest between two pushes.",
-        Check.SLID, 24.0, n_actions=6, n_grasps=3,
+        Check.SLID, 24.0, n_actions=6, n_grasps=2,
     ),
-    Step("tap", "TAP IT", "With a finger, so that it does not slide.", Check.FELT, 20.0, 8),
-    Step("knock", "KNOCK WITH A TOOL", "On it and the hand; nothing slides.", Check.FELT, 20.0, 8),
-    Step("nudge", "PUSH SOFTLY", "Stop before it slides.", Check.FELT, 20.0, 6),
+    Step(
+        "touch", "TAP, KNOCK, PUSH SOFTLY", "With finger and tool, in turn; nothing slides.",
+        Check.FELT, 40.0, n_actions=10,
+    ),
 )  # fmt: skip
-"""The protocol: some seven minutes of samples, and 36 pulls and pushes of the whole hand. The open
-hand comes first: its noise and dead taxels decide about all that follows. Steps in which the object
-slides come before the others, so that nobody stops before the slips."""
+"""The protocol: six grasps and three and a half minutes of samples, with 24 pulls and pushes of the
+whole hand. The open hand comes first: its noise and dead taxels decide about all that follows.
+Steps in which the object slides come before the last, so that nobody stops before the slips."""
