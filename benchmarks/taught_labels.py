@@ -56,6 +56,7 @@ def unknown_is_still(camera):
         filled = [
             Label(module.times[a], module.times[b - 1], "UNSTABLE", "disturbance", author="rule")
             for a, b in runs(unknown)
+            if b - a > 1
         ]
         kept = [x for x in module.labels if x.cause or x.state != ContactState.UNSTABLE]
         return tuple(sorted([*kept, *filled], key=lambda x: x.start))

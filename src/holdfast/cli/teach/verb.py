@@ -60,12 +60,12 @@ def teach(
 ) -> None:
     """Teach a model the slips of your own hand.
 
-    With a SOURCE, it leads through a protocol of some twenty minutes: open hand, hold, carry,
-    pulls and pushes until it slides, taps, knocks and pushes that do not. Each grasp is checked at
-    once and recorded into a folder. It sends nothing to any hand. Slips are measured by --camera
-    and stickers (holdfast label markers); without one it ends with a calibration. Keys: Enter goes
-    on, r repeats, s skips, 1-9 throws a slide away, q quits; a robot sends the lines next,
-    repeat, skip and quit on stdin. After a break, --resume goes on at the step.
+    With a SOURCE, it leads through a protocol of some ten minutes: open hand, carry, pulls and
+    pushes until it slides, taps, knocks and pushes that do not. Each grasp is checked at once and
+    recorded into a folder. It sends nothing to any hand. Slips are measured by --camera and
+    stickers (holdfast label markers); without one it ends with a calibration. Keys: Enter goes on,
+    r repeats, s skips, 1-9 throws a slide away, q quits; a robot sends the lines next, repeat, skip
+    and quit on stdin. After a break, --resume goes on at the step.
 
     Then a copy of the model is written whose slip rule is fitted to these recordings alone.
     Stability and causes stay those of the model. Figures and threshold come from grasps that the

@@ -174,6 +174,7 @@ def propose(
     )
     base = signal.propose(recording, how)
     labels, at = {}, grid + clock.offset
+    doubtful = np.zeros(len(at), dtype=bool)
     for finger, tip in tips.items():
         held = held_at(base[finger], at) & tip.seen
         force = force_of(recording, finger, how)(at)
@@ -193,16 +194,14 @@ def propose(
             for slip in slips
         ]
         note = f"{kind} {source.name}, later by {clock.offset:.3f} s (+/- {clock.error:.3f})"
-        # What no picture shows is as doubtful as what moves too little for a slip.
-        doubtful = ~tip.seen
-        for slip in slips:
-            doubtful |= (at > slip.onset - DOUBT_MARGIN) & (at < slip.end + DOUBT_MARGIN)
-        for label in base[finger]:
-            if label.cause is Cause.DISTURBANCE:
-                rows = slice(*np.searchsorted(at, (label.start, label.end)).tolist())
-                way = max(moved_by(rest, rows, n_samples_of(REST_TIME, grid[1] - grid[0])))
-                doubtful[rows] |= doubtful[rows].any() or way > 1e3 * rule.rest
-        labels[finger] = surely_held(with_slips(base[finger], slips, note), at, doubtful)
+        n = n_samples_of(REST_TIME, grid[1] - grid[0])
+        slips, doubt = sort_motions(at, rest, _disturbed(base[finger], at), slips, rule, n)
+        doubt |= ~tip.seen
+        doubtful |= doubt
+        labels[finger] = surely_held(with_slips(base[finger], slips, note), at, doubt)
+    # A finger out of view holds its object while all others do: it has no slips, but holds.
+    for finger in base.keys() - tips.keys():
+        labels[finger] = surely_held(base[finger], at, doubtful)
     return labels
 
 
@@ -328,6 +327,41 @@ def moved_by(rest: Array, rows: slice, n: int) -> tuple[float, float]:
     return float(np.linalg.norm(np.median(after, axis=0) - place)), float(largest) / 2
 
 
+def sort_motions(
+    times: Array,
+    rest: Array,
+    disturbed: Sequence[slice],
+    slips: list[SeenSlip],
+    rule: VideoRule,
+    n: int,
+) -> tuple[list[SeenSlip], Mask]:
+    """Return the slips whose disturbance leaves the finger elsewhere, and where it may slide.
+
+    Args:
+        times: (n_pictures,) on the clock of the labels [s].
+        rest: (n_pictures, 2) from `unexplained` [mm].
+        disturbed: pictures of each disturbance.
+        slips: that were seen.
+        rule: thresholds.
+        n: values before and after a disturbance that are compared.
+    """
+    doubt = np.zeros(len(times), dtype=bool)
+    for rows in disturbed:
+        away, within = moved_by(rest, rows, n)
+        if away < 1e3 * rule.slid / 2:  # what came back by its end has not slid
+            slips = [x for x in slips if not times[rows.start] <= x.onset <= times[rows.stop - 1]]
+        doubt[rows] = max(away, within) > 1e3 * rule.rest
+    for slip in slips:
+        doubt |= (times > slip.onset - DOUBT_MARGIN) & (times < slip.end + DOUBT_MARGIN)
+    return slips, doubt
+
+
+def _disturbed(labels: tuple[Label, ...], times: Array) -> list[slice]:
+    """Return the pictures of each disturbance."""
+    spans = [(label.start, label.end) for label in labels if label.cause is Cause.DISTURBANCE]
+    return [slice(*np.searchsorted(times, span).tolist()) for span in spans]
+
+
 def surely_held(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
     """Return labels that call no time held in which the finger may slide.
 
@@ -343,15 +377,14 @@ def surely_held(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tupl
     spans = [(-math.inf, float(times[0])), *inside, (float(times[-1]), math.inf)]
     made: list[Label] = []
     for label in labels:
-        is_stable = label.state is ContactState.STABLE
-        if not is_stable and label.cause is not Cause.DISTURBANCE:
-            made.append(label)
-            continue
-        for part, span in _cut(label, spans):
-            if span is None:
-                made.append(part)
-            elif not is_stable:
-                made.append(replace(part, cause=None))
+        parts: list[tuple[Label, int | None]] = [(label, None)]
+        if label.state is ContactState.STABLE or label.cause is Cause.DISTURBANCE:
+            parts = list(_cut(label, spans))
+        sure = [part for part, span in parts if span is None]
+        if label.cause is not Cause.DISTURBANCE:
+            made += sure
+        else:  # it is surely held as a whole, or not at all
+            made.append(label if sure == [label] else replace(label, cause=None))
     return tuple(made)
 
 
