@@ -113,7 +113,7 @@ def _without_prior(rule: Linear, prior: Linear) -> Linear:
     n = prior.n_features
     mean, scale = (moment[:n] for moment in rule.moments)
     raw = np.array(rule.weights[0]) / np.array(rule.scale)
-    weights = raw[:n] + raw[n] * prior.slope * np.array(prior.weights[0]) / np.array(prior.scale)
+    weights = raw[:n] + raw[n] * np.array(prior.weights[0]) / np.array(prior.scale)
     at_mean = float(prior.decision(mean[None])[0])  # the features at their mean, z beside its own
     intercept = rule.intercepts[0] + raw[n] * (at_mean - rule.mean[n])
     return Linear.of(mean, scale, weights * scale, intercept, slope=rule.slope, offset=rule.offset)
