@@ -57,7 +57,7 @@ LIGHT_CHANGE = 0.05
 """Share by which the brightness changes with the light."""
 REST_TIME = 0.3
 """Time before and after a disturbance in which the places of the finger are compared [s]."""
-DOUBT_MARGIN = 0.25
+DOUBT_MARGIN = 0.5
 """Time around a slip in which the finger may slide, too [s]: a sticker does not show the first
 hundredths of a millimetre."""
 
@@ -350,7 +350,9 @@ def sort_motions(
         away, within = moved_by(rest, rows, n)
         if away < 1e3 * rule.slid / 2:  # what came back by its end has not slid
             slips = [x for x in slips if not times[rows.start] <= x.onset <= times[rows.stop - 1]]
-        doubt[rows] = max(away, within) > 1e3 * rule.rest
+        # A slip that was seen explains why it is elsewhere.
+        seen = any(times[rows.start] <= x.onset <= times[rows.stop - 1] for x in slips)
+        doubt[rows] = not seen and max(away, within) > 1e3 * rule.rest
     for slip in slips:
         doubt |= (times > slip.onset - DOUBT_MARGIN) & (times < slip.end + DOUBT_MARGIN)
     return slips, doubt
@@ -359,7 +361,8 @@ def sort_motions(
 def _disturbed(labels: tuple[Label, ...], times: Array) -> list[slice]:
     """Return the pictures of each disturbance."""
     spans = [(label.start, label.end) for label in labels if label.cause is Cause.DISTURBANCE]
-    return [slice(*np.searchsorted(times, span).tolist()) for span in spans]
+    rows = [slice(*np.searchsorted(times, span).tolist()) for span in spans]
+    return [row for row in rows if row.start < row.stop]  # others are before or after the film
 
 
 def surely_held(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tuple[Label, ...]:
@@ -377,14 +380,15 @@ def surely_held(labels: tuple[Label, ...], times: Array, doubtful: Mask) -> tupl
     spans = [(-math.inf, float(times[0])), *inside, (float(times[-1]), math.inf)]
     made: list[Label] = []
     for label in labels:
-        parts: list[tuple[Label, int | None]] = [(label, None)]
-        if label.state is ContactState.STABLE or label.cause is Cause.DISTURBANCE:
-            parts = list(_cut(label, spans))
-        sure = [part for part, span in parts if span is None]
-        if label.cause is not Cause.DISTURBANCE:
-            made += sure
-        else:  # it is surely held as a whole, or not at all
-            made.append(label if sure == [label] else replace(label, cause=None))
+        is_stable = label.state is ContactState.STABLE
+        if not is_stable and label.cause is not Cause.DISTURBANCE:
+            made.append(label)
+            continue
+        for part, span in _cut(label, spans):
+            if span is None:
+                made.append(part)
+            elif not is_stable:
+                made.append(replace(part, cause=None))
     return tuple(made)
 
 

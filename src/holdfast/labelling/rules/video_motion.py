@@ -56,7 +56,7 @@ class VideoRule:
     step: float = 0.00012
     slid: float = 0.0002
     before: float = 0.2
-    rest: float = 0.00008
+    rest: float = 0.00012
 
     def __post_init__(self) -> None:
         check_positive(self)
