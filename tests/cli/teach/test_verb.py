@@ -39,8 +39,8 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path):
     report = json.loads(printed)
     assert (code, err.splitlines()) == (0, report["warnings"])
     assert set(report) == {
-        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "warnings",
-        "verdict",
+        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "features",
+        "warnings", "verdict",
     }  # fmt: skip
     slip = report["heads"]["slip"]
     assert (slip["n"], slip["grasps"], slip["out_of_fold"]["n"]) == (24, 3, 24)
