@@ -301,13 +301,13 @@ def test_a_stream_computes_only_the_kinds_that_it_needs():
     )
     config = stream_config(plan)
     assert sum(int(kinds).bit_count() for kinds in config.lags["sliding"]) == len(SLIDING_CHOICE)
-    assert config.hand["n_slides"] == config.hand["n_track"] == 2 * round(0.133 * RATE) + 1
+    assert config.hand["n_slides"] == config.hand["n_track"] == 2 * round(0.533 * RATE) + 1
     plan = replace(plan, features={"a": ANY_FEATURES})
     assert stream_config(plan).hand["n_slides"] == 0
 
 
 def test_the_lists():
     assert (len(SLIDING_FEATURES), len(set(SLIDING_FEATURES))) == (97, 97)
-    assert len(SLIDING_CHOICE) == 14
+    assert len(SLIDING_CHOICE) == 32
     assert set(SLIDING_CHOICE) < set(SLIDING_FEATURES)
     assert sum(spec.kind not in ZERO_KINDS for spec in SLIDING_FEATURES) == 92

@@ -298,22 +298,16 @@ SLIDING_FEATURES = _sliding(
 )
 """All features of sliding."""
 
-CHOICE_LAG = 0.133
-"""Lag of the changes of `SLIDING_CHOICE` [s], at which `any` compares the taxels anyway."""
-
 SLIDING_CHOICE = _sliding(
-    force_to_noise=SLIDING_LAGS[:1],
-    **dict.fromkeys(
-        ("shear_by_load", "normal_by_load", "force_by_load", "friction_rise", "alignment",
-         "divergence", "relative_divergence", "falling_share", "rising_share"),
-        (CHOICE_LAG,),
-    ),
-    **dict.fromkeys(
-        ("fast_step_30ms", "fast_own_30ms", "fast_step_400ms", "fast_own_400ms"), SLIDING_LAGS[:1]
-    ),
+    force_to_noise=(0.014,), friction_margin=(0.5, 2.0), shear_by_load=(0.03, 0.067, 0.133, 0.533),
+    force_by_load=(0.533,), friction_rise=(0.267,), taxel_friction_rise=(0.067, 0.267),
+    alignment=(0.133,), centre_shift=(0.267, 0.533), divergence=(0.133, 0.267, 0.533),
+    relative_divergence=(0.03,), falling_share=(0.067, 0.133, 0.533),
+    rising_share=(0.067, 0.133, 0.533), fast_step_30ms=(0.014,), fast_shear_30ms=(0.014,),
+    fast_all_30ms=(0.014,), fast_own_30ms=(0.014,), fast_step_400ms=(0.014,),
+    fast_shear_400ms=(0.014,), fast_all_400ms=(0.014,), fast_own_400ms=(0.014,),
 )  # fmt: skip
-"""Those of a linear head: on hands left out it finds as much as with twice as many at five lags,
-each of which costs as much as all that the sums of one lag do (docs/details/models.md)."""
+"""Those of a linear head, from 450 hands: the ones with the least weights were left out in turn."""
 
 ZERO_KINDS = (*_STATES, _MARGIN)
 """Kinds that mean nothing where the readings without contact are not known."""
