@@ -37,7 +37,8 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path):
     words = ("teach", "--from", grasps, "-o", out, "--false-alarms", 3)
     code, printed, err = run(capsys, *words, "--json")
     report = json.loads(printed)
-    assert (code, err.splitlines()) == (0, report["warnings"])
+    warnings = report["warnings"]  # after the features that one taxel cannot have
+    assert (code, err.splitlines()[-len(warnings) :]) == (0, warnings)
     assert set(report) == {
         "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "features",
         "warnings", "verdict",
