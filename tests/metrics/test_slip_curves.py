@@ -202,7 +202,7 @@ class TestRateInUse:
 
     @given(
         rate=st.floats(0.1, 20.0), seed=st.integers(0, 99),
-        minutes=st.tuples(st.floats(0.0, 9.0), st.floats(0.1, 9.0)),
+        minutes=st.tuples(st.just(0.0) | st.floats(0.1, 9.0), st.floats(0.1, 9.0)),
     )  # fmt: skip
     @settings(max_examples=50)
     def test_as_the_slow_twin(self, rate, seed, minutes):
