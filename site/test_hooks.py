@@ -99,4 +99,5 @@ def test_the_navigation_is_short_and_its_user_pages_too():
     aside = {"gallery.md", "changelog.md", "json.md", "formats.md", "metrics.md", "c-header.md"}
     users = re.findall(r"[\w/-]+\.md", text.partition("  - Background:")[0])
     pages = [hooks.DOCS / page for page in users if page not in aside]
-    assert sum(len(page.read_text("utf-8").split()) for page in pages) <= 18_000
+    # Four of them hold the details that stood beside them.
+    assert sum(len(page.read_text("utf-8").split()) for page in pages) <= 19_000
