@@ -17,7 +17,7 @@ import numpy.typing as npt
 from holdfast.errors import RecordingError
 from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.io.importers.columns import Columns
-from holdfast.io.importers.reading import ANY_MODULE, Source, recordings_of
+from holdfast.io.importers.reading import ANY_MODULE, ForeignFile, recordings_of
 from holdfast.io.importers.table import first_texts
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
@@ -89,7 +89,7 @@ def read(
             return
         wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
         arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
-    source = Source(path, arrays, "--topic")
+    source = ForeignFile(path, arrays, "--topic")
     yield from recordings_of(source, wanted, columns, report, accept=accept)
 
 

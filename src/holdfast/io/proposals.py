@@ -19,7 +19,7 @@ MAX_WIDTH = 100
 """Maximum length of a line [characters]."""
 
 
-class Choice(msgspec.Struct, frozen=True):
+class LayoutChoice(msgspec.Struct, frozen=True):
     """A choice that a layout makes.
 
     Attributes:
@@ -52,7 +52,7 @@ class Proposal(msgspec.Struct, frozen=True):
 
     path: str
     found: list[str]
-    choices: list[Choice]
+    choices: list[LayoutChoice]
     sensors: list[tuple[str, str, str]]
     columns: str = ""
     axes: str = ""

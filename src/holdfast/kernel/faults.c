@@ -121,15 +121,20 @@ HF_SHARED bool hf_is_dead(const hf_finger *f)
     return !f->state->is_alive && (hf_real)f->state->n_constant >= least;
 }
 
+/* Return whether the reading of a taxel changed since the last valid sample. */
+HF_SHARED bool hf_has_moved(const hf_finger *f, size_t i)
+{
+    const hf_real *const now = f->readings + i, *const then = f->previous + i;
+    const size_t n = f->n;
+    return now[0] != then[0] || now[n] != then[n] || now[2 * n] != then[2 * n];
+}
+
 /* Return whether nearly all taxels changed at once since the last valid sample. */
 HF_SHARED bool hf_are_moving(const hf_finger *f)
 {
-    const hf_real *const now = f->readings, *const then = f->previous;
-    const size_t n = f->n;
     hf_real n_moving = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
-        n_moving +=
-            now[i] != then[i] || now[n + i] != then[n + i] || now[2 * n + i] != then[2 * n + i];
+        n_moving += hf_has_moved(f, i);
     }
     return f->finger->n_used >= HF_MIN_TAXELS && n_moving >= HF_MOVING_SHARE * f->finger->n_used;
 }

@@ -255,6 +255,7 @@ HF_SHARED hf_scan hf_scan_readings(const hf_finger *f, const hf_real *readings);
 HF_SHARED holdfast_taxel_set hf_taxels_outside(const hf_finger *f, hf_real low, hf_real high);
 HF_SHARED holdfast_taxel_set hf_find_invalid(const hf_finger *f, uint32_t *faults);
 HF_SHARED bool hf_is_dead(const hf_finger *f);
+HF_SHARED bool hf_has_moved(const hf_finger *f, size_t i);
 HF_SHARED bool hf_are_moving(const hf_finger *f);
 HF_SHARED void hf_note_constant(const hf_finger *f, const hf_scan *scan);
 HF_SHARED bool hf_is_stuck(const hf_finger *f);

@@ -184,14 +184,6 @@ static bool hf_are_alike(const hf_finger *f, size_t i, size_t j)
     return r[i] == r[j] && r[n + i] == r[n + j] && r[2 * n + i] == r[2 * n + j];
 }
 
-/* Return whether the reading of a taxel has changed. */
-static bool hf_has_moved(const hf_finger *f, size_t i)
-{
-    const hf_real *const now = f->readings + i, *const then = f->previous + i;
-    const size_t n = f->n;
-    return now[0] != then[0] || now[n] != then[n] || now[2 * n] != then[2 * n];
-}
-
 /* Go on to the next taxel. Watch those that are equal to it, if it has just changed. */
 static void hf_begin_watch(const hf_finger *f)
 {
@@ -219,7 +211,7 @@ static void hf_begin_watch(const hf_finger *f)
     }
     w->n_watched = w->n_alike = 0;
     if (!w->is_watching) { /* it is equal to none any more */
-        w->equals.words[i / 64] &= ~((uint64_t)1 << i % 64);
+        hf_remove(&w->equals, i);
         w->has_equals = !hf_is_empty(f, &w->equals);
     }
 }
@@ -233,7 +225,7 @@ static void hf_go_on_watching(const hf_finger *f)
     w->n_alike += hf_has_moved(f, i);
     for (size_t j = 0; j < f->n_taxels; ++j) {
         if (hf_has(&w->alike, j) && !hf_are_alike(f, i, j)) {
-            w->alike.words[j / 64] &= ~((uint64_t)1 << j % 64);
+            hf_remove(&w->alike, j);
         }
     }
     w->is_watching = !hf_is_empty(f, &w->alike) && w->n_watched < HF_MAX_WATCHED;

@@ -19,7 +19,7 @@ from holdfast.io.header import Header, decode_header
 from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.io.importers.arrays import arrays_of_columns
 from holdfast.io.importers.columns import Columns
-from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.reading import ForeignFile, recordings_of
 from holdfast.io.importers.stored import in_memory
 from holdfast.io.importers.table import natural_order
 from holdfast.io.timed_arrays import (
@@ -341,6 +341,6 @@ def read_foreign_set(
             own = replace(own, episode=EPISODE_COLUMN)
         # The other files are like the first: one report for all.
         once = report if number == 0 else lambda _: None
-        source = Source(file, arrays)
+        source = ForeignFile(file, arrays)
         for recording in recordings_of(source, sensors, own, once, accept=accept):
             yield replace(recording, name=f"{path.name}{recording.name.removeprefix(file.stem)}")

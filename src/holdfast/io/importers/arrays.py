@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from holdfast.errors import RecordingError, require_extras
 from holdfast.io.importers.columns import Columns
-from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.reading import ForeignFile, recordings_of
 from holdfast.io.importers.stored import StoredArray, StoredArrays, arrays_of_records, in_memory
 from holdfast.io.importers.table import csv_files, natural_order
 from holdfast.recordings import Recording
@@ -71,7 +71,9 @@ def read(
         if "allow_pickle" in str(cause):  # NumPy stores objects as pickles
             refuse_pickle(path)
         raise
-    yield from recordings_of(Source(path, arrays), sensors or {}, columns, report, accept=accept)
+    yield from recordings_of(
+        ForeignFile(path, arrays), sensors or {}, columns, report, accept=accept
+    )
 
 
 def _files(path: Path) -> list[Path]:

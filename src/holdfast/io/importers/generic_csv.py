@@ -8,7 +8,7 @@ from pathlib import Path
 from holdfast.errors import RecordingError
 from holdfast.io.importers.columns import Columns
 from holdfast.io.importers.names import named_groups
-from holdfast.io.importers.reading import Source, recordings_of
+from holdfast.io.importers.reading import ForeignFile, recordings_of
 from holdfast.io.importers.table import (
     columns_of_table,
     csv_files,
@@ -88,7 +88,7 @@ def read(
             arrays, head, notes = columns_of_table(file, layout.decimal, text | names)
         matches = (_COMMENT.fullmatch(line) for line in head.comments)
         stated = {(match["key"], match["module"]): match["value"] for match in matches if match}
-        source = Source(file, arrays, "--sensor", stated, notes)
+        source = ForeignFile(file, arrays, "--sensor", stated, notes)
         for recording in recordings_of(source, sensors or {}, columns, report, accept=accept):
             yield replace(recording, name=f"{prefix}{recording.name}")
 

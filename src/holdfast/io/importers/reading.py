@@ -31,8 +31,8 @@ from holdfast.io.importers.table import (
 from holdfast.io.importers.tracks import (
     ANY_MODULE,
     MAX_FINGERS,
+    ForeignFile,
     Layout,
-    Source,
     Track,
     rate_beside,
     tracks_of,
@@ -42,7 +42,7 @@ from holdfast.recordings import Label, Recording, Tactile, labels_from_samples
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 
-__all__ = ["ANY_MODULE", "Source", "recordings_of"]
+__all__ = ["ANY_MODULE", "ForeignFile", "recordings_of"]
 
 DEFAULT_MODULE = "finger1"
 """Name of the module if nothing names one."""
@@ -52,7 +52,7 @@ Rows = npt.NDArray[np.intp]
 
 
 def recordings_of(
-    source: Source,
+    source: ForeignFile,
     sensors: Mapping[str, Sensor],
     columns: Columns | None,
     report: Callable[[str], None],

@@ -21,7 +21,7 @@ from holdfast.io.importers.columns import READING_UNITS, RUN, THREE_AXES, Column
 from holdfast.io.importers.stored import StoredArray, StoredArrays
 from holdfast.io.importers.table import first_texts, natural_order, some_names
 from holdfast.io.importers.times import time_names
-from holdfast.io.proposals import Choice
+from holdfast.io.proposals import LayoutChoice
 from holdfast.sensors import Sensor, built_in_sensors, flat_sensor, sensor
 
 ANY_MODULE = "*"
@@ -47,7 +47,7 @@ _ONE_AXIS = re.compile(
 )
 
 
-class Source(NamedTuple):
+class ForeignFile(NamedTuple):
     """What a file has.
 
     Attributes:
@@ -100,10 +100,10 @@ class Layout:
         used: names of what is read.
     """
 
-    source: Source
+    source: ForeignFile
     sensors: dict[str, Sensor]
     columns: Columns
-    choices: list[Choice] = field(default_factory=list)
+    choices: list[LayoutChoice] = field(default_factory=list)
     options: list[tuple[str, str, str]] = field(default_factory=list)
     used: set[str] = field(default_factory=set)
 
@@ -123,7 +123,7 @@ class Layout:
     def choose(self, what: str, value: str, reason: str, *, is_said: bool = False) -> None:
         """Add a choice, in place of the one of the same field."""
         self.choices = [choice for choice in self.choices if choice.what != what]
-        self.choices.append(Choice(what, value, reason, is_said))
+        self.choices.append(LayoutChoice(what, value, reason, is_said))
 
     def propose_sensor(self, n_taxels: int, unit: str | None, reason: str = "") -> Sensor:
         """Return a sensor of so many taxels, and propose it."""
