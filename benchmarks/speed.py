@@ -31,7 +31,7 @@ from holdfast.detection import (
     haar_features,
     parse_features,
 )
-from holdfast.errors import is_installed
+from holdfast.errors import DISTRIBUTION, is_installed
 from holdfast.kernel.batch import fill_haar_features
 from holdfast.sensors import sensor
 from holdfast.sensors.types import Array
@@ -61,7 +61,7 @@ def benchmark(n_samples: int = 10_000_000, n_updates: int = 20_000) -> dict[str,
 
 def machine() -> dict[str, Any]:
     """Return the machine and the versions that the times depend on."""
-    packages = ("holdfast", "numpy", "scikit-learn", "PyWavelets", "tsflex")
+    packages = (DISTRIBUTION, "numpy", "scikit-learn", "PyWavelets", "tsflex")
     return {
         "processor": platform.processor() or platform.machine(),
         "n_processors": os.cpu_count(),

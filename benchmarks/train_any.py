@@ -43,6 +43,7 @@ from holdfast.detection import (
     Training,
     parse_features,
 )
+from holdfast.errors import DISTRIBUTION
 from holdfast.io import load_dataset
 
 FEATURES = parse_features("any")
@@ -212,7 +213,7 @@ def save(
         split="a fifth of the hands",
         parameters={"*": {"C": C, "class_weight": "balanced"}},
         figures=figures,
-        versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
+        versions={name: version(name) for name in (DISTRIBUTION, "numpy", "scikit-learn")},
     )
     model_of(classifier, threshold, training).save(out, force=True)
     print(f"threshold {threshold:.3f}; {out} written")

@@ -10,6 +10,7 @@ import pytest
 
 from holdfast import save_recording
 from holdfast.errors import (
+    DISTRIBUTION,
     EXTRA_MODULES,
     PACKAGE_PARTS,
     MissingExtra,
@@ -128,7 +129,8 @@ def test_the_core_needs_no_extra(words, outcomes):
     assert out or words[0] == "record" or "--hand" in words
 
 
-def test_the_demo_shows_a_real_recording_before_it_needs_extras(outcomes):
+def test_the_demo_shows_a_real_recording_before_it_needs_extras(outcomes, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     out, err, code = outcomes[tuple(DEMO)]
     *shown, last = err.splitlines()
     assert (out, code) == ("", 2)
@@ -143,7 +145,8 @@ def test_the_demo_shows_a_real_recording_before_it_needs_extras(outcomes):
     [(extra, words) for extra, group in MISSING.items() for words in group],
     ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
-def test_a_missing_extra_is_one_line(extra, words, outcomes):
+def test_a_missing_extra_is_one_line(extra, words, outcomes, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)  # as the commands: outside the clone
     out, err, code = outcomes[tuple(words)]
     assert (out, code) == ("", 2)
     assert err.count("\n") == 1
@@ -156,16 +159,18 @@ def requirements(extra):
     """Return the names of the packages of an extra."""
     return {
         re.match(r"[\w.-]+", text)[0].lower()
-        for text in metadata.requires("holdfast")
+        for text in metadata.requires(DISTRIBUTION)
         if re.search(rf"extra == ['\"]{extra}['\"]", text)
     }
 
 
 def test_the_table_of_modules_fits_the_metadata():
-    declared = set(metadata.metadata("holdfast").get_all("Provides-Extra"))
+    declared = set(metadata.metadata(DISTRIBUTION).get_all("Provides-Extra"))
     packages = {name.removeprefix("holdfast-") for name in PACKAGE_PARTS} - {"lab"}
     assert declared == {*EXTRA_MODULES, *packages, "all"}
-    (every,) = (text for text in metadata.requires("holdfast") if text.startswith("holdfast["))
+    (every,) = (
+        text for text in metadata.requires(DISTRIBUTION) if text.startswith(f"{DISTRIBUTION}[")
+    )
     assert set(re.split(r"[\[\],]", every)[1:-1]) == declared - {"all"}
     assert every.endswith('; extra == "all"')
 

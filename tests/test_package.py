@@ -74,7 +74,7 @@ def test_the_order_of_fields_is_fixed():
 
 
 def test_version_is_that_of_the_distribution():
-    assert holdfast.__version__ == metadata.version("holdfast")
+    assert holdfast.__version__ == metadata.version("holdfast-tactile")
 
 
 def test_other_names_are_refused():

@@ -281,7 +281,7 @@ def test_packages_of_another_version_are_refused(tmp_path, monkeypatch, caplog, 
         assert main(["trial", "--help"]) == 2
     assert caplog.text == ""
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"holdfast-lab 1.2 given, {metadata.version('holdfast')} expected" in line
+    assert f"holdfast-lab 1.2 given, {metadata.version('holdfast-tactile')} expected" in line
 
 
 @pytest.fixture

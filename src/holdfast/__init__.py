@@ -110,7 +110,9 @@ __all__ = sorted({*_HOMES, "__version__"} - _MISSING)  # noqa: PLE0605 (one list
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 (the value is any of the public names)
     if name == "__version__":
-        value: Any = import_module("importlib.metadata").version("holdfast")
+        from holdfast.errors import DISTRIBUTION
+
+        value: Any = import_module("importlib.metadata").version(DISTRIBUTION)
     elif name in _HOMES:
         value = getattr(import_module(f"holdfast.{_HOMES[name]}"), name)
     else:

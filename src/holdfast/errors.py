@@ -17,8 +17,13 @@ line and exits with 2.
 
 import sys
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
 
 from holdfast.removed import removal
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from importlib.metadata import Distribution
 
 EXTRA_MODULES = {
     "parquet": ("pyarrow",),
@@ -51,6 +56,8 @@ EXTRA_PURPOSES = {
 }
 """Purpose of each extra, also of those that install packages beside the core."""
 
+DISTRIBUTION = "holdfast-tactile"
+"""Name of this distribution on the package index, which has another project called holdfast."""
 LABORATORY = "holdfast-lab"
 PACKAGE_PARTS: dict[str, dict[str, tuple[str, ...]]] = {
     "holdfast-grip": {
@@ -186,7 +193,7 @@ def other_version(distribution: str, version: str) -> str:
     """Return why a package beside the core does not fit it; empty if it fits, or is no such."""
     from importlib.metadata import version as version_of
 
-    if distribution not in PACKAGE_PARTS or version == (core := version_of("holdfast")):
+    if distribution not in PACKAGE_PARTS or version == (core := version_of(DISTRIBUTION)):
         return ""
     return (
         f"{distribution} {version} given, {core} expected as of holdfast itself: "
@@ -202,29 +209,65 @@ def _package_command(distribution: str) -> str:
 
 
 def install_command(extra: str) -> str:
-    """Return the command that adds an extra, or several, to this installation.
+    """Return the command that adds an extra, or several, to the environment that runs.
 
-    From a clone it installs the clone, and from a wheel the wheel, not a package of that name.
+    A project of uv gets it by uv itself, which keeps it; any other environment by `pip_command`. A
+    clone is installed from its folder and a wheel from its file: the index may have neither.
     """
     import json
-    from importlib.metadata import distributions
+    from pathlib import Path
+    from urllib.parse import unquote
+
+    installed = next(installed_distributions(DISTRIBUTION), None)
+    origin = json.loads((installed and installed.read_text("direct_url.json")) or "{}")
+    is_clone = origin.get("dir_info", {}).get("editable")
+    folder = Path(unquote(origin["url"].removeprefix("file://"))) if is_clone else None
+    project, command = Path(sys.prefix).parent, pip_command("install")
+    if command.startswith("uv ") and (project / "uv.lock").exists():
+        verb = "sync --inexact" if folder == project else f"add {DISTRIBUTION}"
+        where = "" if Path.cwd().is_relative_to(project) else f' --project "{project}"'
+        return f"uv {verb}{where}" + "".join(f" --extra {name}" for name in extra.split(","))
+    if folder:
+        beside = folder / "packages" / f"holdfast-{extra}"
+        return f'{command} -e "{beside if beside.is_dir() else f"{folder}[{extra}]"}"'
+    return f'{command} "{DISTRIBUTION}[{extra}]{" @ " * bool(origin)}{origin.get("url", "")}"'
+
+
+def pip_command(verb: str) -> str:
+    """Return the command of uv or pip, whichever installed holdfast, for the environment that runs.
+
+    The environment is named where the shell would choose another one.
+    """
+    import os
+    import shutil
     from pathlib import Path
 
-    # setuptools leaves metadata in `src` as well, which no installer has made.
-    found = (one for one in distributions(name="holdfast") if one.read_text("INSTALLER"))
-    if (installed := next(found, None)) is None:
-        return f'pip install "holdfast[{extra}]"'
-    with_uv = (installed.read_text("INSTALLER") or "").strip() == "uv"
-    origin = json.loads(installed.read_text("direct_url.json") or "{}")
-    if origin.get("dir_info", {}).get("editable"):
-        folder = origin["url"].removeprefix("file://")
-        beside = Path(folder, "packages", f"holdfast-{extra}")
-        with_extra = f"{folder}[{extra}]"
-        pip = f'pip install -e "{beside if beside.is_dir() else with_extra}"'
-        options = "".join(f" --extra {name}" for name in extra.split(","))
-        return f"uv sync --inexact{options}" if with_uv else pip
-    package = f"holdfast[{extra}] @ {origin['url']}" if origin else f"holdfast[{extra}]"
-    return f'{"uv " * with_uv}pip install "{package}"'
+    installed = next(installed_distributions(DISTRIBUTION), None)
+    if installed and (installed.read_text("INSTALLER") or "").strip() == "uv":
+        is_active = os.environ.get("VIRTUAL_ENV") == sys.prefix
+        return f"uv pip {verb}" + ("" if is_active else f' --python "{sys.prefix}"')
+    is_active = Path(shutil.which("pip") or "").parent == Path(sys.executable).parent
+    return f"pip {verb}" if is_active else f'"{sys.executable}" -m pip {verb}'
+
+
+def installed_distributions(name: str) -> "Iterator[Distribution]":
+    """Return the distributions of a name that an installer made.
+
+    setuptools leaves metadata in `src` as well, which no installer has made.
+    """
+    from importlib.metadata import distributions
+
+    return (found for found in distributions(name=name) if found.read_text("INSTALLER"))
+
+
+def other_project() -> str:
+    """Return a line about the project called holdfast, if it is installed too; else empty."""
+    return "".join(
+        f"the distribution holdfast {other.version} ({other.metadata['Summary']}) is installed "
+        f"beside {DISTRIBUTION}; it may have replaced files of it: "
+        f"{pip_command('uninstall')} holdfast, then install {DISTRIBUTION} again"
+        for other in installed_distributions("holdfast")
+    )
 
 
 def package_versions() -> dict[str, dict[str, str | None]]:
@@ -234,8 +277,8 @@ def package_versions() -> dict[str, dict[str, str | None]]:
 
     requirement = re.compile(r"(?P<package>[\w.-]+)(?:.*extra\s*==\s*['\"](?P<extra>[\w-]+)['\"])?")
     versions: dict[str, dict[str, str | None]] = {}
-    for match in filter(None, map(requirement.match, requires("holdfast") or [])):
-        if match["package"] != "holdfast":
+    for match in filter(None, map(requirement.match, requires(DISTRIBUTION) or [])):
+        if match["package"] != DISTRIBUTION:
             group = versions.setdefault(match["extra"] or "", {})
             try:
                 group[match["package"]] = version(match["package"])

@@ -132,7 +132,7 @@ class PluginGroup(Generic[T]):
         return [
             Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
             for point, refusal in self._points()
-            if refusal or point.dist is None or point.dist.name not in ("holdfast", *PACKAGE_PARTS)
+            if refusal or not _is_own(point)
         ]
 
     def error(self, name: str) -> str:
@@ -149,7 +149,9 @@ class PluginGroup(Generic[T]):
         """Return the entry points, each with the reason why its name cannot be used, or ""."""
         from importlib.metadata import entry_points  # it takes as long as all of `--help`
 
-        points = list(entry_points(group=f"{GROUP_PREFIX}{self.kind}"))
+        declared = entry_points(group=f"{GROUP_PREFIX}{self.kind}")
+        # An earlier name of a distribution may have left metadata of the same object.
+        points = list({(point.name, point.value): point for point in declared}.values())
         # Of two with one name the first counts, whatever the order of folders on the path.
         points.sort(key=lambda point: (point.name, _package(point)))
         first: dict[str, EntryPoint] = {}
@@ -184,6 +186,13 @@ class PluginGroup(Generic[T]):
 
             self._reported.add(text)
             logging.getLogger(LOGGER_NAME).warning("%s", text)
+
+
+def _is_own(point: "EntryPoint") -> bool:
+    """Return whether the core or a package beside it has a plug-in."""
+    package = point.dist
+    is_beside = package is not None and package.name in PACKAGE_PARTS
+    return is_beside or point.value.startswith("holdfast.")
 
 
 def _package(point: "EntryPoint") -> str:

@@ -68,7 +68,7 @@ def test_without_words_the_help_is_shown(capsys):
 
 def test_version(capsys):
     assert main(["--version"]) == 0
-    assert capsys.readouterr().out == f"holdfast {metadata.version('holdfast')}\n"
+    assert capsys.readouterr().out == f"holdfast {metadata.version('holdfast-tactile')}\n"
 
 
 def complete(*words):

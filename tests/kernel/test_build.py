@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BUILD_FILES = ("pyproject.toml", "setup.py", "MANIFEST.in", "README.md", "LICENSE")
-BUILD = "uv sync --inexact --reinstall-package holdfast, or pip install -e ."
+BUILD = "uv sync --inexact --reinstall-package holdfast-tactile, or pip install -e ."
 
 
 @pytest.fixture(scope="module")

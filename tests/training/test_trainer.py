@@ -142,7 +142,7 @@ def test_the_model_has_its_provenance(grasps):
     assert (provenance.split, provenance.seed) == ("recording", 0)
     assert set(provenance.parameters) == {"thumb", "index"}
     assert provenance.figures["auc"] == trained.cross_validation.pooled.auc
-    assert set(provenance.versions) == {"holdfast", "numpy", "scikit-learn"}
+    assert set(provenance.versions) == {"holdfast-tactile", "numpy", "scikit-learn"}
     assert trained.model.rate == pytest.approx(100.0)
     assert trained.model.sensors == {"tiny": TINY}
 

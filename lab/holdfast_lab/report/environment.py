@@ -7,10 +7,11 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from holdfast.errors import DISTRIBUTION
 from holdfast.threads import usable_processors
 
 REPORTED_PACKAGES = (
-    "holdfast", "numpy", "scipy", "scikit-learn", "optuna", "mujoco", "msgspec",
+    DISTRIBUTION, "numpy", "scipy", "scikit-learn", "optuna", "mujoco", "msgspec",
     "matplotlib",
 )  # fmt: skip
 GIB = 2**30

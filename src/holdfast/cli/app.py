@@ -24,6 +24,7 @@ from holdfast.cli.extensions import PluginOptions
 from holdfast.cli.options import RARE
 from holdfast.cli.terminal.console import break_silence, print_error, print_line, print_message
 from holdfast.errors import (
+    DISTRIBUTION,
     PACKAGE_PARTS,
     HoldfastError,
     RecordingError,
@@ -270,7 +271,7 @@ def _version(value: bool) -> None:
     if value:
         from importlib.metadata import version
 
-        print_line(f"holdfast {version('holdfast')}")
+        print_line(f"holdfast {version(DISTRIBUTION)}")
         raise typer.Exit
 
 

@@ -20,7 +20,7 @@ from holdfast.contact import Fault, Reason
 from holdfast.detection.kernel_config import stream_config
 from holdfast.detection.model import Model
 from holdfast.detection.plan import OPEN_HAND, Start, StreamPlan
-from holdfast.errors import ModelError
+from holdfast.errors import DISTRIBUTION, ModelError
 from holdfast.kernel.structs import fields_of, n_mask_words, types_of
 from holdfast.sensors import Sensor
 
@@ -170,7 +170,7 @@ def header_of(
     state_size = tables.types["holdfast_detector_memory"].itemsize + HEADER_FIELDS
     # Names in capitals stand between @ in the template.
     parts = {
-        "VERSION": version("holdfast"),
+        "VERSION": version(DISTRIBUTION),
         # A model may have any name; a C string and a comment may not.
         "MODEL": re.sub(r"[^\w.:-]", "_", model.name or "model"),
         "MODEL_DIGEST": model.digest,

@@ -8,10 +8,10 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
-from holdfast.errors import HoldfastError
+from holdfast.errors import DISTRIBUTION, HoldfastError
 from holdfast.kernel.sources import digest
 
-_BUILD = "uv sync --inexact --reinstall-package holdfast, or pip install -e ."
+_BUILD = f"uv sync --inexact --reinstall-package {DISTRIBUTION}, or pip install -e ."
 _PACKAGE = Path(__file__).parents[1]
 # A wheel has no module.c, so nothing is compared there.
 _SOURCES = digest(_PACKAGE) if (_PACKAGE / "kernel" / "module.c").exists() else None

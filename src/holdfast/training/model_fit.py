@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import UNSET
 
 from holdfast.detection import FeatureSpec, FingerModel, Head, Model, Training
-from holdfast.errors import TrainingError
+from holdfast.errors import DISTRIBUTION, TrainingError
 from holdfast.metrics import SampleMetrics
 from holdfast.recordings import Recording
 from holdfast.training.classifiers.fitting import Parameters
@@ -219,6 +219,6 @@ def training_record(
         seed=setting.seed,
         samples=dict(thinned) or UNSET,
         sliding_samples=dict(sliding) or UNSET,
-        versions={name: version(name) for name in ("holdfast", "numpy", "scikit-learn")},
+        versions={name: version(name) for name in (DISTRIBUTION, "numpy", "scikit-learn")},
         blocks=UNSET if init is None else init.blocks,
     )

@@ -21,7 +21,7 @@ from holdfast.detection.features import extract
 from holdfast.detection.heads import Linear
 from holdfast.detection.plan import StreamPlan, Tare
 from holdfast.detection.specs import SLIDING_CHOICE, SLIDING_FEATURES, FeatureSpec
-from holdfast.errors import TrainingError
+from holdfast.errors import DISTRIBUTION, TrainingError
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
     SlipSummary,
@@ -310,7 +310,7 @@ def teach_with_report(
         split="recording",
         parameters={ANY_FINGER: {**LogisticRegression().reference, "C": TAUGHT_C}},
         seed=seed,
-        versions={name: version(name) for name in ("holdfast", "numpy")},
+        versions={name: version(name) for name in (DISTRIBUTION, "numpy")},
         sliding_samples={ANY_FINGER: samples.n_positive},
     )
     name = f"{model.name.removesuffix(TAUGHT_SUFFIX)}{TAUGHT_SUFFIX}"

@@ -10,7 +10,7 @@ from holdfast import save_recording
 from holdfast.cli import main
 from holdfast.devices.sources.xela import addresses
 from holdfast.devices.uri import source_states
-from holdfast.errors import EXTRA_PURPOSES, install_command
+from holdfast.errors import DISTRIBUTION, EXTRA_PURPOSES, install_command
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, sensor
 
@@ -31,7 +31,7 @@ def report(capsys):
 def test_the_report(capsys, monkeypatch):
     monkeypatch.setattr("holdfast.devices.sources.xela.addresses.own_address", lambda: None)
     found = report(capsys)
-    assert found["holdfast"] == metadata.version("holdfast")
+    assert found["holdfast"] == metadata.version("holdfast-tactile")
     assert found["packages"]["numpy"] == np.__version__
     assert found["cpus"] >= 1
     assert found["kernels"] == {"ok": True, "error": None}
@@ -51,7 +51,7 @@ def test_missing_packages_are_reported(capsys, monkeypatch):
     known = metadata.version
 
     def version(package):
-        if package != "holdfast":
+        if package != DISTRIBUTION:
             raise metadata.PackageNotFoundError(package)
         return known(package)
 

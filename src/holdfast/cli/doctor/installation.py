@@ -8,7 +8,13 @@ from typing import Any
 
 from holdfast.cli.extensions import plugin_states
 from holdfast.cli.terminal.console import print_line, print_table
-from holdfast.errors import EXTRA_PURPOSES, install_command, package_versions
+from holdfast.errors import (
+    DISTRIBUTION,
+    EXTRA_PURPOSES,
+    install_command,
+    other_project,
+    package_versions,
+)
 from holdfast.removed import REMOVED
 from holdfast.threads import usable_processors
 
@@ -30,7 +36,8 @@ def installation() -> dict[str, Any]:
     packages = package_versions()
     data = os.environ.get("HOLDFAST_DATA")
     return {
-        "holdfast": metadata.version("holdfast"),
+        "holdfast": metadata.version(DISTRIBUTION),
+        "conflict": other_project() or None,
         "python": platform.python_version(),
         "platform": platform.platform(),
         "cpus": usable_processors(),
@@ -84,6 +91,8 @@ def print_installation(report: dict[str, Any]) -> None:
         if table:
             print_line()
             print_table(header, table)
+    if report["conflict"]:
+        print_line(report["conflict"])
     for x in report["plugins"]:
         if x["kind"] in REMOVED["plugins"]:
             print_line(f"plug-in {x['name']} of {x['package']} is skipped: {x['error']}")
