@@ -62,13 +62,11 @@ def test_missing_extras_name_the_command_that_adds_them(
     files = {"INSTALLER": f"{installer}\n", "direct_url.json": origin and json.dumps(origin)}
     found = [SimpleNamespace(read_text=files.get)] if installer else []
     bare = SimpleNamespace(read_text={}.get)  # what setuptools leaves in `src`
-    project, bin_folder = prefix.removesuffix("/.venv"), f"{prefix if is_active else '/usr'}/bin"
+    project, programs = prefix.removesuffix("/.venv"), f"{prefix if is_active else '/usr'}/bin"
     monkeypatch.setattr("importlib.metadata.distributions", lambda name: [bare, *found])
     monkeypatch.setattr("pathlib.Path.exists", lambda path: str(path) in PROJECTS)
     monkeypatch.setattr("pathlib.Path.cwd", lambda: Path(project if is_active else "/elsewhere"))
-    monkeypatch.setattr(
-        "shutil.which", lambda name: f"{prefix if is_active else '/usr'}/bin/{name}"
-    )
+    monkeypatch.setattr("shutil.which", lambda name: f"{programs}/{name}")
     monkeypatch.setattr(sys, "prefix", prefix)
     monkeypatch.setattr(sys, "executable", f"{prefix}/bin/python")
     monkeypatch.setenv("VIRTUAL_ENV", prefix if is_active else "/other")
