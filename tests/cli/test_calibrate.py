@@ -54,7 +54,7 @@ def test_it_is_the_library_that_calibrates(capsys, folder, mine, tmp_path, monke
     lines = printed.splitlines()
     assert len(lines) <= 24
     assert max(map(len, lines)) <= 80
-    assert lines[-1].startswith("mine.json: ")
+    assert " ".join(lines).partition("Next: ")[2].endswith("holdfast detect mine.json SOURCE")
 
 
 def test_json(capsys, folder, tmp_path):
@@ -62,7 +62,7 @@ def test_json(capsys, folder, tmp_path):
     code, printed, err = calibrated(capsys, folder, out, "--json", "--false-alarms", 4)
     report = json.loads(printed)
     assert (code, err) == (0, "")
-    assert set(report) == {"model", "sensors", "warnings"}
+    assert set(report) == {"model", "sensors", "warnings", "next"}
     (seen,) = report["sensors"]
     assert set(seen) == {
         "sensor", "fingers", "seconds", "load_change", "n_features", "n_changed", "activity",

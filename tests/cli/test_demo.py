@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import urllib.request
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -13,8 +14,10 @@ import pytest
 from command_line import Verb
 from holdfast import simulated_grasps
 from holdfast.cli import demo as verb
-from holdfast.detection import Model
-from holdfast.io import load_dataset
+from holdfast.contact import STABLE
+from holdfast.demo_data import BOX_SLIPS
+from holdfast.detection import Model, detect
+from holdfast.io import load_dataset, load_recording
 from holdfast.parallel import Engine
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
@@ -53,6 +56,7 @@ def test_simulates_trains_and_replays(capsys, tmp_path):
     assert result["shipped"]["model"] == verb.DEMO_MODEL
     assert result["shipped"]["metrics"]["events"]["hand"]["onsets"] == "truth"
     assert result["seconds"] > 0
+    assert Path(result["picture"]).stat().st_size > 0
     assert err.count("/5  ") == 5
     assert all(len(line) <= 80 for line in err[err.index("5/5") :].splitlines()[1:])
     code, out, err = run(capsys, folder, "--speed", 0)
@@ -61,11 +65,31 @@ def test_simulates_trains_and_replays(capsys, tmp_path):
     code, out, _ = run(capsys, folder, "--speed", 0, "--seed", 1, "--force")
     assert code == 0
     assert {r.metadata["seed"] for r in load_dataset(folder / "recordings")} == {1}
-    # The verdicts stand last, and all of it fits a terminal.
+    # What it shows stands last, with the picture, and all of it fits a terminal.
     lines = out.rstrip("\n").splitlines()
     assert len(lines) < 24
+    assert lines[-1].startswith(f"{folder}/box-slips.png: UNSTABLE {result['lead']:.2f} s before")
     assert all(len(line) <= 80 for line in lines if str(folder) not in line)
     assert f"{folder}/recordings" in out and "holdfast evaluate builtin:" in out
+
+
+def test_the_lead_is_that_of_the_unstable_time_that_the_slip_is_in():
+    """Against the detection of the whole recording, sample by sample."""
+    recording = load_recording(BOX_SLIPS)
+    (slip,) = [x for x in recording.modules["finger1"].labels if x.cause == "slip"]
+    trace = detect(Model.load("builtin:any"), recording).fingers["finger1"]
+    stable = trace.times[(trace.times < slip.start) & (trace.state == STABLE)]
+    summary, label = verb.show_real_recording(0)
+    assert label == slip
+    assert 0 < verb.unstable_since(summary, slip) - stable[-1] < 2 / 60
+
+
+def test_a_second_run_has_a_folder_of_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("holdfast-demo", "holdfast-demo-2", "holdfast-demo-3"):
+        assert verb.new_folder(force=False) == Path(name)
+        Path(name).mkdir()
+    assert verb.new_folder(force=True) == Path("holdfast-demo")
 
 
 def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, monkeypatch):

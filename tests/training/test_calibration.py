@@ -183,6 +183,9 @@ def test_handling_sets_the_threshold_of_slips(model, calibrated):
     (slips,) = calibrated.sensors[0].slips
     assert (model.reports_slips, calibrated.model.reports_slips) == (False, True)
     assert slips.n <= slips.minutes < slips.at_most * slips.minutes
+    before, after = calibrated.sensors[0].before, calibrated.sensors[0].after
+    assert before.false_slips_per_minute is None  # it reports none
+    assert after.false_slips_per_minute == pytest.approx(slips.n / slips.minutes)
     part = calibrated.model.finger("thumb", PAD)
     assert part.slip.threshold == slips.threshold
     assert part.slip.rule == model.finger("thumb").slip.rule
@@ -278,6 +281,22 @@ def test_still_handling_does_not_shrink_the_scales(model):
     assert summary.after.raised <= summary.before.raised
     with pytest.raises(TrainingError, match="pad"):
         report.check()
+
+
+@pytest.mark.parametrize(
+    ("change", "command"),
+    [
+        ({"threshold": 1.0}, "holdfast teach hand: -o taught.json"),
+        ({"at_most": 2.1}, "minutes more of handling"),
+        ({"at_most": 1.9}, "holdfast detect mine.json hand:"),
+    ],
+)
+def test_what_to_do_next(calibrated, change, command):
+    (slips,) = calibrated.sensors[0].slips
+    slips = msgspec.structs.replace(slips, **{"threshold": 0.5, **change})
+    summary = msgspec.structs.replace(calibrated.sensors[0], slips=(slips,))
+    report = dataclasses.replace(calibrated, sensors=(summary,))
+    assert command in report.next_step("mine.json", "hand:", 1.0)
 
 
 FIGURES = HandlingFigures(0.4, 95.0, 2.0, 0.1, 1.0)

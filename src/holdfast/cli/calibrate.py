@@ -1,5 +1,6 @@
 """`holdfast calibrate`: a model with the own handling of a hand, without labels."""
 
+import shlex
 from typing import Annotated
 
 import typer
@@ -89,7 +90,7 @@ def calibrate(
     if not live and (seconds is not None or speed != 1.0):
         raise ValueError(f"--seconds and --speed are for live sources; {data} is a recording")
     check_speed(data, speed)
-    recorded = None
+    recorded, source_name = None, data if live else "SOURCE"
     if live:
         data, is_twin = _handled(data)
         opened = sources.open_source(data, speed=speed, loop=is_twin)
@@ -113,8 +114,12 @@ def calibrate(
     calibrated.model.save(out, force=force)
     for warning in calibrated.warnings:
         print_message(warning)
+    advice = calibrated.next_step(shlex.quote(str(out)), shlex.quote(source_name), false_alarms)
     if as_json:
-        print_json({"model": out, "sensors": calibrated.sensors, "warnings": calibrated.warnings})
+        print_json({
+            "model": out, "sensors": calibrated.sensors, "warnings": calibrated.warnings,
+            "next": advice,
+        })  # fmt: skip
         return
     for summary in calibrated.sensors:
         print_paragraph(summary.text())
@@ -123,6 +128,7 @@ def calibrate(
             print_paragraph(slips.text())
         print_line()
     print_line(f"{out}: {calibrated.model.name or 'the model'}")
+    print_paragraph(f"Next: {advice}")
 
 
 def _handled(uri: str) -> tuple[str, bool]:

@@ -45,15 +45,18 @@ MAX_ACTIVITY = 2.0
 more in the held samples in which it does not slide; over half have more while they slide."""
 FALSE_ALARMS = 1.0
 """False alarms of slips per minute of held time of a finger, unless another number is given."""
+UNSURE = 2.0
+"""More handling is recommended if the upper end of the rate of false alarms of slips is above this
+multiple of the rate that was asked for."""
 CALIBRATED_SUFFIX = ", calibrated"
 """End of the name of a calibrated model."""
 
 COMPARED_FIGURES = (
-    ("STABLE in the held samples [%]", "stable", 1),
-    ("alarms per minute of holding", "alarms_per_minute", 1),
-    ("threshold of STABLE", "threshold", 3),
-    ("slip reported in the held samples [%]", "raised", 1),
+    ("false slips a minute of a finger that holds", "false_slips_per_minute", 1),
+    ("times a minute UNSTABLE, then STABLE again", "alarms_per_minute", 1),
+    ("STABLE of the time of holding [%]", "stable", 1),
     ("threshold of a slip", "slip_threshold", 3),
+    ("threshold of STABLE", "threshold", 3),
 )
 """Text, field of the figures and number of digits of each row of the comparison."""
 
@@ -67,6 +70,8 @@ class HandlingFigures(msgspec.Struct, frozen=True):
         alarms_per_minute: alarms of all fingers per minute of held time.
         slip_threshold: of the probability of a slip; None without a slip rule.
         raised: share of the held samples in which a slip is reported [%]; None without one.
+        false_slips_per_minute: false alarms of slips per minute of held time of a finger; None
+            without a rule, or where its threshold is 1, so that it reports none.
     """
 
     threshold: float
@@ -74,6 +79,7 @@ class HandlingFigures(msgspec.Struct, frozen=True):
     alarms_per_minute: float
     slip_threshold: float | None = None
     raised: float | None = None
+    false_slips_per_minute: float | None = None
 
     @classmethod
     def of(cls, handling: GraspingFingers, part: FingerModel) -> Self:
@@ -86,6 +92,9 @@ class HandlingFigures(msgspec.Struct, frozen=True):
             alarms_per_minute=handling.alarms_per_minute(stable),
             slip_threshold=slip,
             raised=None if slip is None else 100 * handling.raised,
+            false_slips_per_minute=(
+                None if slip is None or slip >= 1 else handling.false_slips_per_minute
+            ),
         )
 
     def worse_than(self, other: "HandlingFigures") -> bool:
@@ -149,7 +158,7 @@ class HandlingSummary(msgspec.Struct, frozen=True):
         )
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return the figures before and after as rows of a table; a dash for unknown ones."""
+        """Return the figures before and after as rows of a table; a dash where there is none."""
         return [
             (
                 title,
@@ -185,6 +194,28 @@ class CalibratedModel:
     model: Model
     sensors: tuple[HandlingSummary, ...]
     warnings: tuple[str, ...]
+
+    def next_step(self, out: str, source: str, false_alarms: float) -> str:
+        """Return what to do next, with its command.
+
+        Args:
+            out: path of the model.
+            source: of the hand.
+            false_alarms: as in `calibrate`.
+        """
+        heads = [slips for summary in self.sensors for slips in summary.slips]
+        heads = [slips for slips in heads if not slips.is_silent]
+        if not heads:
+            return (
+                f"{out} reports no slip; holdfast teach {source} -o taught.json learns those of "
+                "this hand in ten guided minutes"
+            )
+        if max(slips.at_most for slips in heads) > UNSURE * false_alarms:
+            return (
+                f"{max(slips.more_minutes for slips in heads):g} minutes more of handling make "
+                f"sure how many slips are false; or try it: holdfast detect {out} {source}"
+            )
+        return f"holdfast detect {out} {source}"
 
     def check(self, hint: str = "") -> None:
         """Check that the arm moved, and that decisions about the handling are no worse than before.

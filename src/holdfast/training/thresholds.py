@@ -45,7 +45,7 @@ from holdfast.metrics.slip_curves import (
     summarise_choice,
 )
 from holdfast.metrics.slip_truth import NOT_HELD, STILL, SlipDecisions, SlipTruth
-from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, slip_metrics
+from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, count_slips, slip_metrics
 from holdfast.metrics.statistics import poisson_limit
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Flags
@@ -619,6 +619,16 @@ class GraspingFingers:
     def raised(self) -> float:
         """Share of the held samples in which a slip is reported, at the threshold of the model."""
         return sum(finger.n_raised for finger in self.fingers) / self.n_held
+
+    @property
+    def false_slips_per_minute(self) -> float | None:
+        """False alarms of slips per minute of held time of a finger; None without a rule.
+
+        They are those of the threshold of the model.
+        """
+        decided = [slips for finger in self.fingers if (slips := finger.slips) is not None]
+        counts = SlipCounts.total(map(count_slips, decided))
+        return 60 * int(counts.false_held) / counts.held_seconds if decided else None
 
     def alarms_per_minute(self, threshold: float) -> float:
         """Return the number of alarms of all fingers per minute of held time."""
