@@ -70,6 +70,17 @@ def test_the_service_runs_until_ctrl_c(capsys, grasp, when_served):
     assert set(found[0]["fingers"]) == {"thumb", "index", "middle"}
 
 
+@pytest.mark.parametrize("word", ["--browser", "--no-browser"])
+def test_the_page_opens_in_a_browser_or_not(capsys, grasp, when_served, monkeypatch, word):
+    opened = []
+    monkeypatch.setattr("holdfast.web.server.open_browser", lambda url: not opened.append(url))
+    when_served(lambda url: ask(f"{url}api/v1/info"))
+    code, out, err = run(capsys, MODEL, grasp, "--port", 0, "--json", word)
+    assert code == 0
+    assert opened == [json.loads(out)["url"]] * (word == "--browser")
+    assert ("has opened" in err) == bool(opened)
+
+
 def test_a_recording_is_ended_with_the_service(capsys, grasp, when_served, tmp_path):
     def work(url):
         begun = ask(f"{url}api/v1/recording", "POST")

@@ -1,6 +1,5 @@
 """`holdfast demo`: a real recording, then the whole chain on simulated data."""
 
-import sys
 import time
 from collections.abc import Mapping
 from itertools import chain, count
@@ -155,9 +154,9 @@ def replay(
     """
     from holdfast.cli.detect.output import watch
     from holdfast.live.web.serving import show_recording
-    from holdfast.web.server import has_browser
+    from holdfast.web.server import wants_browser
 
-    if has_browser() and sys.stdin.isatty() if browser is None else browser:
+    if wants_browser(browser):
         show_recording(DEMO_MODEL, shown, recorded, speed, print_message)
         return None
     return watch(DEMO_MODEL, shown, REPLAY_SPEED * speed, fingers=False)

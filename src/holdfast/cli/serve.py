@@ -10,6 +10,7 @@ import typer
 from holdfast.cli.extensions import PublisherOptions
 from holdfast.cli.options import (
     LOCALHOST,
+    BrowserOption,
     DetectorOptions,
     JsonOption,
     ModelArgument,
@@ -37,6 +38,7 @@ def serve(
     ] = Path("recordings"),
     speed: SpeedOption = 1.0,
     once: OnceOption = False,
+    browser: BrowserOption = None,
     options: DetectorOptions,
     start: StartOptions,
     publishers: PublisherOptions,
@@ -73,7 +75,7 @@ def serve(
         # The server takes longest to import: a source that is not there is refused before it.
         from holdfast.live.web.serving import run_page
         from holdfast.web.guard import Guard
-        from holdfast.web.server import page_url
+        from holdfast.web.server import open_browser, page_url, wants_browser
 
         guard = Guard(access.host, token)
 
@@ -83,8 +85,9 @@ def serve(
             if as_json:
                 print_json({"url": page, "model": loaded.name, "source": source})
                 sys.stdout.flush()  # a program that reads the pipe waits for the address
+            opened = "has opened and " * (wants_browser(browser) and open_browser(page))
             print_message(
-                f"{page} shows the estimates of {loaded.name} for {source}; Ctrl-C stops it"
+                f"{page} {opened}shows the estimates of {loaded.name} for {source}; Ctrl-C stops it"
             )
 
         session = stack.enter_context(Session(options.create_stream(loaded, unopened, start)))

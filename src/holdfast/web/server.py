@@ -174,6 +174,11 @@ def has_browser() -> bool:
     return bool(desktop or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
+def wants_browser(option: bool | None) -> bool:
+    """Return whether a page is opened: by default for a person at a terminal with a browser."""
+    return has_browser() and sys.stdin.isatty() if option is None else option
+
+
 def open_browser(url: str) -> bool:
     """Open a page in a graphical browser; return False if there is none."""
     if not has_browser():
