@@ -1,9 +1,10 @@
-"""Make the film of the live page for the front page of the site: docs/img/live.webp.
+"""Make the picture of the live page, docs/img/live.png, and its film, docs/img/live.webp.
 
-    uv run --group dev python site/film.py [OUT]
+    uv run --group dev python site/film.py [FOLDER]
 
-`holdfast serve` replays the recording that ships at half its speed, again and again, and a
-browser without a display takes the pictures. It needs Chromium.
+The picture is of a grasp of the twin in which some fingers have slid and others are stable. For the
+film, `holdfast serve` replays the recording that ships at half its speed, again and again. A
+browser without a display takes both. It needs Chromium, and a machine that is not busy.
 """
 
 import json
@@ -23,7 +24,18 @@ from playwright.sync_api import sync_playwright
 
 from holdfast.demo_data import BOX_SLIPS
 
-OUT = Path(__file__).parents[1] / "docs" / "img" / "live.webp"
+OUT = Path(__file__).parents[1] / "docs" / "img"
+PICTURE, PICTURE_SIZE = (
+    ("builtin:twin", "twin:?object=bottle&seed=3"),
+    {"width": 1280, "height": 720},
+)
+"""Model and source of the picture, and its size [pixels]."""
+MIXED = """() => {
+  const text = document.body.innerText, states = text.match(/\\b(UN)?STABLE\\b/g) ?? [];
+  return /slid \\d/.test(text) && states.includes("STABLE") && states.includes("UNSTABLE");
+}"""
+"""Script that returns whether the page shows a slip, and fingers in both states."""
+FILM = ("builtin:any", BOX_SLIPS.name, "--speed", "0.5")
 DURATION = 9.6
 """Of the film [s]: one replay of the recording at half its speed."""
 FRAME_PERIOD = 0.25
@@ -36,16 +48,15 @@ OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 
 
 def main() -> None:
-    """Write the film."""
-    out = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
-    with served() as url, sync_playwright() as playwright:
-        chromium = shutil.which("chromium") or shutil.which("chromium-browser")
-        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
-        page = browser.new_page(viewport=VIEW, color_scheme="light")
-        page.goto(url)
+    """Write the picture, then the film."""
+    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
+    with opened(*PICTURE, size=VIEW) as page:
+        page.wait_for_function(MIXED, timeout=180_000)
+        page.screenshot(path=folder / "live.png")
+    out = folder / "live.webp"
+    with opened(*FILM, size=VIEW) as page:
         page.wait_for_function("() => /starts again/.test(document.body.innerText)", timeout=60_000)
         pictures = [Image.open(BytesIO(picture)) for picture in pictures_of(page)]
-        browser.close()
     frames = [picture.convert("RGB").resize(SIZE, Image.Resampling.LANCZOS) for picture in pictures]
     frames[0].save(
         out, save_all=True, append_images=frames[1:], duration=round(1000 * FRAME_PERIOD), loop=0,
@@ -55,14 +66,26 @@ def main() -> None:
 
 
 @contextmanager
-def served() -> Iterator[str]:
-    """Serve the page, and give its address; the film shows the name of the copied recording."""
+def opened(*words: str, size: Any) -> Iterator[Any]:
+    """Serve a model and source, and open the page; the film shows the name of the recording."""
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    with served(*words) as url, sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
+        page = browser.new_page(viewport=size, color_scheme="light")
+        page.goto(url)
+        yield page
+        browser.close()
+
+
+@contextmanager
+def served(*words: str) -> Iterator[str]:
+    """Serve a model and source, in a folder with a copy of the recording; give the address."""
     holdfast = str(Path(sys.executable).with_name("holdfast"))
-    words = ["serve", "builtin:any", BOX_SLIPS.name, "--port", "0", "--speed", "0.5", "--json"]
+    options = ["--port", "0", "--json", "--no-browser"]
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(BOX_SLIPS, folder)
         process = subprocess.Popen(
-            [holdfast, *words], stdout=subprocess.PIPE, text=True, cwd=folder
+            [holdfast, "serve", *words, *options], stdout=subprocess.PIPE, text=True, cwd=folder
         )
         try:
             yield json.loads(process.stdout.readline() if process.stdout else "null")["url"]
