@@ -1,5 +1,6 @@
 """Tables as labs have them: separators, encodings, times, several sensors and recordings."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -108,6 +109,13 @@ def test_stamps_that_do_not_increase_are_a_rate_in_the_proposal(tmp_path, times,
         imported(tmp_path / "a.csv", text)
     check(imported(tmp_path / "a.csv", text, accept=True))
     check(imported(tmp_path / "a.csv", text, columns="time=100Hz"))
+
+
+def test_a_row_for_each_taxel_is_no_fast_sensor(tmp_path):
+    pairs = itertools.product(range(N), "ab")
+    text = ["time,taxel,x,y,z", *(f"{k / 100:.2f},{taxel},1,2,3" for k, taxel in pairs)]
+    with pytest.raises(RecordingError, match=r"a row for each taxel at each of the times"):
+        imported(tmp_path / "a.csv", text)
 
 
 def test_stamps_without_digits_say_no_rate(tmp_path):

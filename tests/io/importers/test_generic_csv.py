@@ -182,7 +182,7 @@ def test_a_file_that_names_its_sensor_has_times_in_seconds(tmp_path):
 
 
 DOUBT = [
-    ("time", [0, 1, 2], "time=100Hz if it counts samples"),
+    ("time", [0, 1, 2], "time=100Hz with the true rate if it counts samples"),
     ("t", [0.0, 0.5, 1.0], "--columns time=t:ms"),
     ("time_ms", [0.0, 0.01, 0.02], "--columns time=time_ms:s"),
     ("time_s", [0, 10, 20], "--columns time=time_s:ms"),

@@ -247,6 +247,13 @@ class _Reader:
         )
         if not problem or np.mean(~of_times.increasing(times[first])) <= of_times.MAX_STEPS_BACK:
             return times
+        columns = {other: array.read() for other, array in track.beside.items() if other != name}
+        if turning := of_times.turning_columns(times, columns):
+            raise RecordingError(
+                f"a row for each {' and '.join(turning)} at each of the times of {name!r} given, a "
+                f"row for each time expected: pandas.DataFrame.pivot(index={name!r}, "
+                f"columns={turning}) makes it, its columns named as t01_x, t01_y, t01_z, t02_x"
+            )
         rate = of_times.true_rate(times[first])
         if rate is None:
             raise RecordingError(
@@ -277,9 +284,10 @@ class _Reader:
             choose("time", rate, "a number beside the array", is_said=True)
             return None
         if not names:
+            among = f" among {some_names(list(track.beside))}" if track.beside else ""
             raise RecordingError(
-                f"no column of times among {some_names(list(track.beside))}: give --columns "
-                "time=COLUMN, or time=100Hz with the true rate if there is none"
+                f"no column of times{among}: give --columns time=COLUMN, or time=100Hz with the "
+                "true rate if there is none"
             )
         numbers = {
             name: track.beside[name].read().reshape(-1).astype(np.float64)[first]

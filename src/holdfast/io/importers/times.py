@@ -30,6 +30,9 @@ SMOOTHER = 0.5
 MIN_EPISODE = 10
 """Minimum number of samples from a restart of the times to the next."""
 
+MIN_TURN = 2
+"""Minimum number of rows of the same time in a table with a row for each taxel."""
+
 _CLOCK = re.compile(r"(?P<h>\d{1,2}):(?P<m>\d{2}):(?P<s>\d{2}(?:\.\d*)?)")
 _DAY = re.compile(r"(?:\d{1,4}[./]\d{1,2}[./]\d{1,4})?")
 _UNIT_WORDS = {
@@ -103,7 +106,8 @@ def times_of(name: str, values: Array, unit: str | None, nominal: float) -> Time
         nominal: rate of the sensor [Hz].
 
     Raises:
-        RecordingError: the unit that is said gives an impossible rate.
+        RecordingError: the unit that is said gives an impossible rate, or without one all steps
+            are 1.
 
     Example:
         >>> times_of("stamp", np.array([0.0, 10.0, 20.0]), None, 100.0).unit
@@ -128,9 +132,12 @@ def times_of(name: str, values: Array, unit: str | None, nominal: float) -> Time
             f"{low:g} to {high:g} Hz expected: give --columns time={name}:{likely} "
             f"({its_rate:.4g} Hz), or the unit that is true"
         )
+    if (np.diff(values) == 1).all():
+        raise RecordingError(
+            f"column {name!r} with steps of 1 given: give --columns time=100Hz with the true rate "
+            f"if it counts samples, or time={name}:ms if it does not"
+        )
     reason = f"steps of {step:.6g}: {its_rate:.4g} Hz in {likely}, {rate:.4g} Hz in s"
-    if step == 1:
-        reason += "; time=100Hz if it counts samples"
     return Times(values * TIME_UNITS[likely], likely, reason)
 
 
@@ -234,6 +241,26 @@ def check_steps(name: str, times: Array) -> str:
     what = "go back" if after < before else "stand still"
     share = 100 * len(wrong) / len(steps)
     return f"times of {name} {what} at sample {first + 1}, in {share:.2g} % of the samples"
+
+
+def turning_columns(times: Array, columns: Mapping[str, Array]) -> list[str]:
+    """Return the columns that have the same values in the same order at each of the times.
+
+    A table with a row for each taxel and time has such columns, and one with coarse times has none.
+
+    Example:
+        >>> turning_columns(np.repeat([0.0, 0.1], 3), {"taxel": np.tile([1, 2, 3], 2)})
+        ['taxel']
+    """
+    n_rows = int(np.argmax(times != times[0]))
+    if n_rows < MIN_TURN or len(times) % n_rows or (np.diff(times.reshape(-1, n_rows)) != 0).any():
+        return []
+    return [
+        name
+        for name, values in columns.items()
+        if len(set(values[:n_rows].tolist())) > 1
+        and (values.reshape(-1, n_rows) == values[:n_rows]).all()
+    ]
 
 
 def restarts(times: Array) -> list[int]:
