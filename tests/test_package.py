@@ -50,8 +50,8 @@ def test_names_are_taken_where_objects_are():
     model = holdfast.Model.load("builtin:any")
     by_name = holdfast.detect("builtin:any", recording)
     assert by_name.to_frame().equals(holdfast.detect(model, recording).to_frame())
-    assert holdfast.Detector("builtin:any", {"index": "uskin-4x4"}).reset() is None
-    for value in (module, recording, model, by_name):
+    detector = holdfast.Detector("builtin:any", {"index": "uskin-4x4"})
+    for value in (module, recording, model, by_name, by_name.fingers["index"], detector):
         assert len(repr(value)) < 100
 
 
@@ -62,6 +62,8 @@ def test_names_are_taken_where_objects_are():
 def test_a_recording_of_arrays_names_what_it_needs(modules, what):
     with pytest.raises(holdfast.RecordingError, match=r"Tactile\(.*" + what):
         holdfast.Recording("mine", modules)
+    with pytest.raises(holdfast.RecordingError, match=f"{type(modules).__name__} given"):
+        holdfast.detect("builtin:any", modules)
 
 
 def test_the_order_of_fields_is_fixed():

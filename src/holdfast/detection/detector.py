@@ -25,7 +25,7 @@ from holdfast.detection.kernel_config import (
 from holdfast.detection.model import Model
 from holdfast.detection.plan import Start, StreamPlan, declared_baselines
 from holdfast.detection.traces import STATE_BY_CODE, Chunk, Detection, EstimateTypes, detection_of
-from holdfast.errors import ModelError, StreamError
+from holdfast.errors import ModelError, RecordingError, StreamError
 from holdfast.kernel import _extension
 from holdfast.kernel.structs import struct_type
 from holdfast.recordings import BASELINES, Recording
@@ -150,6 +150,9 @@ class Detector:
     def __getstate__(self) -> object:
         # A copy would share the memory of the kernel with this one.
         raise TypeError("a detector is not copied or pickled; make another of the same model")
+
+    def __repr__(self) -> str:
+        return f"Detector of {', '.join(self._plan.fingers)}"
 
     @property
     def n_fingers(self) -> int:
@@ -324,6 +327,7 @@ def detect(
 
     Raises:
         ModelError: the recording has none of the model's fingers, or another sensor.
+        RecordingError: it is no recording.
         ValueError: a tare by interval finds no samples.
 
     Example:
@@ -333,6 +337,12 @@ def detect(
         >>> sorted(found.fingers), len(found.fingers["index"]), found.hand.shape
         (['index', 'middle', 'thumb'], 1725, (1725,))
     """
+    if not isinstance(recording, Recording):
+        raise RecordingError(
+            f"a Recording expected, {type(recording).__name__} given: "
+            'Recording("mine", {"index": Tactile("uskin-4x4", times, readings)}), or of a file '
+            "load_recording(path)"
+        )
     model = Model.of(model)
     recording = at_rate(recording.with_start(loaded=in_contact), model.rate)
     return Detector.for_recording(model, recording).run(recording)

@@ -117,6 +117,9 @@ class FingerTrace(NamedTuple):
     def __len__(self) -> int:
         return len(self.times)
 
+    def __repr__(self) -> str:
+        return f"FingerTrace({len(self)} samples)"
+
     @property
     def is_dead(self) -> Flags:
         """(n,) whether the readings never changed: the finger does not count for the hand."""
