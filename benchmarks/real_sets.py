@@ -14,12 +14,15 @@ Three sets, on which nothing was trained:
   Share called STABLE and share without an estimate, of the samples in contact; alarms a minute.
 
 Scores: one minus the probability of stability, and the probability of a slip. The first column is
-the trivial baseline, which calls every sample STABLE.
+the trivial baseline, which calls every sample STABLE. The next two are the rules that a reader
+tries first: the change of the force (of a box over 8 samples, of a tug since its start), and the
+speed of the arm, which is not tactile. Their thresholds are those of `calibrate`: 95 % of the
+stable samples of the other recordings without slip are below.
 """
 
 import argparse
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -27,12 +30,12 @@ from typing import NamedTuple
 import numpy as np
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Cause
-from holdfast.detection import FingerTrace, Model, detect
+from holdfast.detection import FingerTrace, Model, detect, fingertip_force
 from holdfast.errors import HoldfastError
 from holdfast.io.importers import import_recordings
 from holdfast.io.importers.table import SLIPPED
 from holdfast.metrics.statistics import mann_whitney_u
-from holdfast.recordings import Recording, label_states
+from holdfast.recordings import Label, Recording, Tactile, label_states
 from holdfast.training.calibration import calibrate
 
 TUG_QUIET = (0.2, 0.5)
@@ -91,7 +94,10 @@ def main(folder: Path, names: Sequence[str]) -> None:
         ],
         list(import_recordings(folder / "gtac_v2")),
     )
-    columns: dict[str, dict[str, float]] = {}
+    columns: dict[str, dict[str, float]] = {
+        "change of the force": rule_figures(force_change, sets[0]) | tug_change(sets[1]),
+        "speed of the arm": rule_figures(arm_speed, sets[0]),
+    }
     for name in names:
         model = Model.load(name)
         columns[f"{name}"] = figures(lambda _, model=model: model, *sets)
@@ -99,11 +105,11 @@ def main(folder: Path, names: Sequence[str]) -> None:
             columns[f"{name}, calibrated"] = figures(
                 lambda handling, model=model: calibrate(model, handling), *sets
             )
-    rows = list(next(iter(columns.values())))
+    rows = list(columns[names[0]])
     columns = {"always stable": {row: ALWAYS_STABLE.get(row, 0.5) for row in rows}, **columns}
     print(f"| | {' | '.join(columns)} | goals |\n|---|{'--:|' * (len(columns) + 1)}")
     for row in rows:
-        values = " | ".join(f"{column[row]:.3f}" for column in columns.values())
+        values = " | ".join(f"{column.get(row, math.nan):.3f}" for column in columns.values())
         goals = ", ".join(f"{goal:g}" for goal in GOALS.get(row, ()))
         print(f"| {row} | {values} | {goals} |")
 
@@ -119,6 +125,66 @@ def figures(
         | tug_figures(model_for, tugged)
         | hold_figures(model_for, holds)
     )
+
+
+def force_change(module: Tactile, truth: Mapping[str, np.ndarray], lag: int = 8) -> np.ndarray:
+    force = fingertip_force(module.readings, module.sensor, tare="none")
+    change = np.full(len(force), np.nan)
+    change[lag:] = np.linalg.norm(force[lag:] - force[:-lag], axis=1)
+    return change
+
+
+def arm_speed(module: Tactile, truth: Mapping[str, np.ndarray]) -> np.ndarray:
+    return np.linalg.norm(truth["robot_velocity"], axis=1)
+
+
+def rule_figures(
+    score: Callable[[Tactile, Mapping[str, np.ndarray]], np.ndarray],
+    recordings: Sequence[Recording],
+) -> dict[str, float]:
+    """Return the figures of the boxes by a threshold on a score of each sample of a finger."""
+    held, slipping = {}, {}
+    for item in recordings:
+        parts = [
+            (score(module, item.truth.hand), label_states(module.labels, module.times), module)
+            for module in item.modules.values()
+        ]
+        held[item.name] = np.concatenate([values[labels == STABLE] for values, labels, _ in parts])
+        if slips_in(item):
+            slipping[item.name] = np.concatenate(
+                [values[is_slip(module.labels, module.times)] for values, _, module in parts]
+            )
+    stable, missed, values = [], [], {}
+    for name, scores in held.items():
+        calm = [held[other] for other in held if other != name and other not in slipping]
+        threshold = np.nanquantile(np.concatenate(calm), 0.95)
+        stable.append(float((scores[np.isfinite(scores)] <= threshold).mean()))
+        if name in slipping:
+            missed.append(slipping[name] > threshold)
+            values[f"boxes: AUC, 1 - stable, {name[-8:]}"] = auc(slipping[name], scores)
+    return {
+        "boxes: stable called STABLE": float(np.median(stable)),
+        "boxes: slip not called STABLE": float(np.concatenate(missed).mean()),
+        **values,
+    }
+
+
+def tug_change(sequences: Sequence[tuple[Recording, bool]]) -> dict[str, float]:
+    """Return the AUC of the largest change of the force since the start of a tug."""
+    largest: tuple[list[float], list[float]] = ([], [])
+    for recording, slipped in sequences:
+        changes = []
+        for module in recording.modules.values():
+            force = fingertip_force(module.readings, module.sensor, tare="none")
+            change = np.linalg.norm(force - force[0], axis=1)
+            changes.append(change[module.times >= TUG_START].max())
+        largest[int(slipped)].append(max(changes))
+    return {"tugs: AUC, 1 - stable": auc(np.array(largest[1]), np.array(largest[0]))}
+
+
+def is_slip(labels: Sequence[Label], times: np.ndarray) -> np.ndarray:
+    slips = tuple(label for label in labels if label.cause is Cause.SLIP)
+    return label_states(slips, times) != UNKNOWN
 
 
 def auc(positive: np.ndarray, negative: np.ndarray) -> float:
@@ -158,9 +224,8 @@ def fingers_of(model: Model, recording: Recording) -> list[Finger]:
     parts = []
     for name, trace in detect(model, recording).fingers.items():
         labels = recording.modules[name].labels
-        slips = tuple(label for label in labels if label.cause is Cause.SLIP)
-        known = label_states(slips, trace.times) != UNKNOWN
-        parts.append(Finger(trace, label_states(labels, trace.times), known))
+        slips = is_slip(labels, trace.times)
+        parts.append(Finger(trace, label_states(labels, trace.times), slips))
     return parts
 
 

@@ -31,32 +31,36 @@ class TestPublished:
         assert others == {"study.json", "grip", "sources", *templates}
 
 
+def row_of_readme(question):
+    readme = (ROOT / "README.md").read_text("utf-8").splitlines()
+    return next(line for line in readme if line.startswith(f"| {question}"))
+
+
 def test_the_readme_quotes_the_published_study(summary):
     figures = script.Figures(summary["tables"])
-    readme = (ROOT / "README.md").read_text("utf-8").splitlines()
-    method = next(line for line in readme if line.startswith("The method builds on"))
-    ours, paper = (
-        [
-            figures.cell(
-                "confusion",
-                {"classifier": name, "on": "held out", "figure": "accuracy"},
-                field=field,
-            )
-            for name in ("LogReg", "SVM")
-        ]
-        for field in ("ours", "paper")
+
+    def accuracies(table, on, digits=1, field="ours"):
+        rows = [{"classifier": x, "on": on, "figure": "accuracy"} for x in ("LogReg", "SVM")]
+        return [figures.cell(table, row, digits, field=field) for row in rows]
+
+    row = row_of_readme("Is the contact disturbed or held?")
+    held_out = ", ".join(accuracies("confusion", "held out"))
+    fresh = ", ".join(accuracies("unseen", "fresh recordings"))
+    assert f"| {held_out} %; {fresh} % |" in row
+    paper = accuracies("unseen", "fresh recordings", 2, "paper")
+    assert f"unseen data of its own: {paper[0]}, {float(paper[1]):g} % |" in row
+
+
+def test_the_readme_quotes_the_test_of_hands_never_met():
+    source = json.loads((PUBLISHED / "sources" / "slips.json").read_text("utf-8"))["any"]
+    ours, rival = (dict(zip(source["columns"], source["rows"][k], strict=True)) for k in (0, 1))
+    found, rate = (
+        [row[name].split()[0] for row in (ours, rival)]
+        for name in ("before 1 mm", "false alarms, held")
     )
-    assert f"are correct in {ours[0]} and {ours[1]} % of the held-out samples" in method
-    assert f"(the paper reports {paper[0]} and {paper[1]} %)" in method
-    hands = {"on": "unseen objects", "error": "samples of hands [%]", "left out": "nothing"}
-    hands["baseline of"] = "all other methods"
-    rival, own = (
-        figures.cell("strongest", hands | {"figure": f"{name} [%]"})
-        for name in ("baseline", "holdfast")
-    )
-    row = next(line for line in readme if line.startswith("| twin, objects not in the training"))
-    assert f"| [{own} %](docs/study.md) |" in row
-    assert f"| strongest rival {rival} %;" in row
+    row = row_of_readme("Is this finger of a hand never met slipping?")
+    assert f"| {found[0]} %; {float(rate[0]):.1f} |" in row
+    assert f"{rival['by']}: {found[1]} %; {float(rate[1]):.1f} |" in row
 
 
 ROWS = [

@@ -4,9 +4,20 @@ The names below are the public interface; each is imported when it is first used
 `import holdfast` costs next to nothing.
 
 Example:
-    >>> import holdfast
-    >>> holdfast.Hand.__name__
-    'Hand'
+    >>> from holdfast import Model, StreamDetector, open_source
+    >>> from holdfast.demo_data import BOX_SLIPS  # a real robot; "xela://auto" is your hand
+    >>> with open_source(BOX_SLIPS, speed=0) as source:
+    ...     for event in StreamDetector(Model.load("builtin:any"), source).changes():
+    ...         print(f"{event.time:.3f} s  {event.finger}: {event.state}")
+    0.013 s  finger1: STABLE
+    0.013 s  finger2: STABLE
+    0.013 s  hand: STABLE
+    1.103 s  finger1: UNSTABLE
+    1.103 s  finger2: UNSTABLE
+    1.103 s  hand: UNSTABLE
+    3.624 s  finger2: NO_CONTACT
+    3.674 s  finger1: NO_CONTACT
+    3.674 s  hand: NO_CONTACT
 """
 
 from importlib import import_module

@@ -1,18 +1,18 @@
+import re
+
 import pytest
 from msgspec.structs import replace
 
+import holdfast
 from holdfast import simulated_grasps
 from holdfast.cli import demo
-from holdfast.io import save_recording
 from holdfast.parallel import Engine
-from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
 from holdfast.twin.profile import profile
 
 from . import blocks
 
 README = blocks.ROOT / "README.md"
-DEMO, HAND, FILES, CODE = ("",), ("I have a hand",), ("I have files",), ("I write code",)
 SHORT = replace(profile("reference"), idle=(0.7, 0.8), hold=6.0)
 
 
@@ -29,25 +29,23 @@ def short_demo(monkeypatch):
     )
 
 
-def test_the_demo(folder, short_demo):
+def test_the_page(folder, short_demo):
     replaced = {"uv run holdfast demo": "holdfast demo --no-browser --speed 0"}
-    assert blocks.run_page(README, replaced, DEMO) == 1
+    assert blocks.run_page(README, replaced) == 2
 
 
-def test_files_of_ones_own_and_code(folder, csv_recordings):
+def test_files_of_ones_own(folder, csv_recordings):
     csv_recordings("my-data")
-    assert blocks.run_page(README, {}, FILES) == 1
+    assert blocks.run_page(blocks.ROOT / "docs" / "which-way.md") == 1
     assert (folder / "model.json").exists()
-    save_recording(synthetic_recording("live", 0), folder / "live.parquet")
-    replaced = {'open_source("xela://auto")': 'open_source("live.parquet", speed=0)'}
-    assert blocks.run_page(README, replaced, CODE) == 2
 
 
-def test_a_hand_of_ones_own(folder, hand):
-    replaced = {"serve builtin:any xela://auto": f"serve builtin:any '{hand}' --port 0"}
-    assert blocks.run_page(README, replaced, HAND) == 1
+def test_the_front_page_is_short():
+    assert len(README.read_text("utf-8").split()) <= 550
 
 
-def test_every_section_is_run():
-    sections = {block.section for block in blocks.blocks_of(README)}
-    assert sections == {*DEMO, *HAND, *FILES, *CODE}
+def test_help_shows_the_example():
+    """`help(holdfast)` has the lines of README's program."""
+    (program,) = [b.text for b in blocks.blocks_of(README) if b.language == "python"]
+    shown = re.sub(r"^ {4}(>>>|\.\.\.) ?", "", holdfast.__doc__, flags=re.M)
+    assert [line for line in program.splitlines() if line and line not in shown] == []

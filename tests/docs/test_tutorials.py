@@ -33,14 +33,14 @@ def test_your_hand(folder, hand):
             "holdfast label grasps": "holdfast label --port 0 grasps",
         },
     )
-    assert n_run == 8
+    assert n_run == 5
     assert (folder / "my-hand.json").exists()
     assert (folder / "grasps" / "grasp0.labels.json").exists()
 
 
 def test_from_python(folder, monkeypatch, capsys):
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
-    assert blocks.run_page(DOCS / "tutorials" / "from-python.md") == 10
+    assert blocks.run_page(DOCS / "tutorials" / "from-python.md") == 9
     out = capsys.readouterr().out
     assert "STABLE" in out
     assert "{'window': " in out
@@ -57,7 +57,7 @@ def test_from_pandas(folder, capsys):
 
 
 def test_your_own_sensor(folder, capsys):
-    assert blocks.run_page(DOCS / "tutorials" / "own-sensor.md") == 6
+    assert blocks.run_page(DOCS / "tutorials" / "own-sensor.md") == 5
     out = capsys.readouterr().out  # its lines are compared with those of the page
     (pushed,) = re.findall(r"^ +([\d.]+) +finger1 +UNSTABLE +STABLE$", out, re.M)[:1]
     assert 5.0 <= float(pushed) <= 5.2
@@ -68,12 +68,6 @@ def test_from_ros2(folder):
     pytest.importorskip("cyclonedds")
     replace = {"--ros2": "--ros2 --port 0"}
     assert blocks.run_page(DOCS / "tutorials" / "from-ros2.md", replace) == 1
-
-
-def test_a_figure(folder, public_box):
-    assert blocks.run_page(DOCS / "tutorials" / "figure.md", public_box) == 4
-    for name in ("grasp.pdf", "errors.pdf", "probability.pdf"):
-        assert (folder / name).read_bytes().startswith(b"%PDF")
 
 
 def test_from_the_registry_to_a_decision(folder, public_box, capsys):
@@ -97,7 +91,7 @@ def test_exports(folder, public_box):
 
 def test_how_to(folder):
     save_grasps(folder / "recordings")
-    assert blocks.run_page(DOCS / "how-to.md") == 4
+    assert blocks.run_page(DOCS / "how-to.md") == 3
     assert (folder / "part.parquet").exists()
 
 

@@ -94,6 +94,6 @@ def test_windows_in_seconds_give_the_same_at_other_times(times_of, most):
 
 
 def test_windows_in_samples_give_others_where_the_rate_changes():
-    """As `docs/details/live.md` says."""
+    """As `docs/live.md` says."""
     mine, other = both_of("builtin:noise-floor", bursts)
     assert np.mean([a.state != b.state for a, b in zip(mine, other, strict=True)]) > 0.01

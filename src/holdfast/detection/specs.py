@@ -92,7 +92,7 @@ KINDS = {
         _over_lag("shear_gain", "ratio"),
         _over_lag("normal_gain", "ratio"),
         _over_lag("ratio_gain", "ratio"),
-        # Of sliding, with the equations of docs/details/models.md: the friction of the finger
+        # Of sliding, with the equations of docs/decisions/0019: the friction of the finger
         # and of its taxels, the force, and the friction beside the largest of the last seconds.
         _over_lag("friction", "sliding", reach=0),
         _over_lag("taxel_friction", "sliding", reach=0),

@@ -169,7 +169,7 @@ def is_uri(text: str) -> bool:
     return bool(_SCHEME.match(text)) and not Path(text).exists()
 
 
-def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source":
+def open_source(text: str | Path, *, speed: float = 1.0, loop: bool = False) -> "Source":
     """Return the source of a path or URI; entering it connects.
 
     Args:
@@ -187,7 +187,7 @@ def open_source(text: str, *, speed: float = 1.0, loop: bool = False) -> "Source
         ...     print(list(source.sensors))
         ['thumb', 'index', 'middle', 'ring']
     """
-    if not is_uri(text):
+    if isinstance(text, Path) or not is_uri(text):
         from holdfast.devices.sources.replay import ReplaySource
 
         return ReplaySource(text, speed=speed, loop=loop)

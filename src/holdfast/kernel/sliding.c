@@ -3,7 +3,7 @@
  * They have no unit. Of taxel i, y_i = f_i - b_i is the reading beyond the tare in its own frame,
  * N_i = (y_i)_z, T_i = (y_i)_xy, and w_i = |N_i| / sum |N_j| its share of the load. F is the
  * fingertip force, F_z = F . n, F_t = F - F_z n, s the noise of a reading, m the number of taxels,
- * and L = max(sum |N_i|, 10 s sqrt(m)). docs/details/models.md lists all. */
+ * and L = max(sum |N_i|, 10 s sqrt(m)). docs/decisions/0019 lists all. */
 #include "finger.h"
 
 /* Least load in a denominator: of a finger, by s sqrt(m), and of a taxel, by s. */

@@ -16,7 +16,7 @@ GRID: tuple[Parameters, ...] = tuple(
 """Parameters that are tried, the strongest regularisation first; of equal losses the first wins.
 
 Decades are enough: over a factor of 10 in C the loss hardly changes, because a few features have
-many samples. Of random hands the best C is near the low end. docs/details/training.md compares the
+many samples. Of random hands the best C is near the low end. docs/decisions/0004 compares the
 grid with a search of 30 trials."""
 INNER_FOLDS = 5
 

@@ -39,7 +39,7 @@ def test_a_hand_that_does_not_answer_is_one_line(grasp, capsys, monkeypatch):
 
 
 def test_the_table_of_fault_times_has_those_of_the_code():
-    page = (Path(__file__).parents[5] / "docs" / "details" / "grip.md").read_text("utf-8")
+    page = (Path(__file__).parents[5] / "docs" / "grip.md").read_text("utf-8")
     silence = f"{1000 * ros_hand.SILENCE_TIME:.0f} ms, or {ros_hand.SILENCE_PERIODS:g} of their"
     assert f"| {silence} periods |" in page
     assert f"| {1000 * ros_hand.STATE_TIMEOUT:.0f} ms |" in page
