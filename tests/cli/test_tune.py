@@ -47,7 +47,7 @@ def test_json_the_table_and_info(capsys, grasps, tmp_path):
     _, printed, _ = tune(capsys, grasps, out, "--false-alarms", 30, "--force", data="new")
     assert check_table(printed).startswith(f"{out}: STABLE from ")
     # The verdict is in sample, also in that of `evaluate` on the same recordings.
-    assert " (in sample): " in report["verdict"]
+    assert "in sample): " in report["verdict"]
     _, printed, _ = run(capsys, "evaluate", out, grasps / "new", "--json")
     assert json.loads(printed)["verdict"] == report["verdict"]
 

@@ -45,10 +45,10 @@ def evaluate(
     Print metrics by sample (accuracy, FDR, FPR, FNR, AUC) and by event (missed events, detection
     delay, false alarms), for each finger and for the hand, and of the slips of each finger (found
     in time, false alarms), if the model has a slip rule; with bootstrap intervals over the
-    recordings. Sentences before them say what the model is good for, from the recordings that it
-    was not trained on. The others are named, because their metrics are optimistic. The figure
-    shows errors, delays and slips. CSV files, with labels in a column, are read directly; a folder
-    of them needs --sensor.
+    recordings. Before them stands what the model is worth ("good", "usable", "weak" or "not
+    enough data"), from the recordings that it was not trained on. The others are named, because
+    their metrics are optimistic. The figure shows errors, delays and slips. CSV files, with labels
+    in a column, are read directly; a folder of them needs --sensor.
 
     Example:
       holdfast evaluate model.json recordings/

@@ -55,7 +55,7 @@ def warn_about_recordings(evaluation: "Evaluation", n_recordings: int) -> None:
 
 
 def print_verdict(sentence: str) -> None:
-    """Print the sentence on what a model is good for."""
+    """Print what a model is worth."""
     print_paragraph(sentence)
     print_line()
 

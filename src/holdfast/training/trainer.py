@@ -85,7 +85,7 @@ class Trained:
 
     @property
     def verdict(self) -> str | None:
-        """What the model is good for, in one sentence; None if some recordings are `known`."""
+        """What the model is worth; None if some recordings are `known`."""
         return None if self.known else verdict(self.cross_validation, self.tares)
 
 
