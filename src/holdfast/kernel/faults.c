@@ -12,12 +12,12 @@
 /* A taxel stands still by a fault if it does so this many times as long as ever before. Healthy
  * taxels reached 5 times in 24 randomized hands, and once in real recordings. */
 #define HF_STILL_RATIO ((hf_real)10)
-/* Time between comparisons of single axes [s], and the time for which an axis that moves is the
- * same at most. On real magnetic skins, no axis was the same for longer than 0.45 s. */
+/* Time over which it is found whether a single axis changed [s], and the time for which an axis that
+ * moves is the same at most. On real magnetic skins, no axis was the same for longer than 0.45 s. */
 #define HF_COMPARED_SECONDS ((hf_real)0.15)
 #define HF_MOVING_SECONDS ((hf_real)1)
-/* An axis is the same by a fault if it is so this many times as long as ever before: by chance, it
- * is the same n times with the power n of the chance of once. */
+/* An axis is the same by a fault if it is so this many times as long as ever before: by chance, n
+ * samples are the same with the power n of the chance of one. */
 #define HF_SAME_RATIO ((hf_real)5)
 /* Factor of the time for which an axis is the same that differed fewer than HF_MIN_CHANGES times.
  */
@@ -242,6 +242,7 @@ static hf_real hf_second_square(const hf_finger *f, size_t i, const hf_real chan
         hf_real *const last = &f->changes[axis * f->n + i];
         second[axis] = change[axis] - *last;
         *last = change[axis];
+        f->moved[axis * f->n + i] += hf_abs(change[axis]);
     }
     taxel->n_changed += 1;
     taxel->changed_at = f->state->n_changes;
@@ -301,6 +302,9 @@ static void hf_update_lively(
     hf_store(f->changes + i, change.x);
     hf_store(f->changes + n + i, change.y);
     hf_store(f->changes + 2 * n + i, change.z);
+    hf_store(f->moved + i, hf_load(f->moved + i) + hf_wide_abs(change.x));
+    hf_store(f->moved + n + i, hf_load(f->moved + n + i) + hf_wide_abs(change.y));
+    hf_store(f->moved + 2 * n + i, hf_load(f->moved + 2 * n + i) + hf_wide_abs(change.z));
     const hf_wide first = hf_load(f->powers + i), power = hf_load(f->powers + n + i);
     hf_store(f->powers + i, (1 - share) * first + share * hf_squares(change));
     hf_store(f->powers + n + i, (1 - share) * power + share * hf_squares(second));
@@ -443,7 +447,7 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
 
 /* Return whether an axis of a taxel is the same for far longer than ever before.
  *
- * others: most comparisons for which one that moves was the same. */
+ * others: most intervals for which one that moves was the same. */
 static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
 {
     /* Same for max(2 s, 5 times as long as ever before); one that differed too seldom, for
@@ -462,12 +466,13 @@ static bool hf_is_same(const holdfast_taxel *taxel, size_t axis, int32_t others)
 static void hf_find_stuck_axis(const hf_finger *f, size_t axis)
 {
     const hf_real *const readings = f->readings + axis * f->n;
+    hf_real *const moved = f->moved + axis * f->n;
     holdfast_taxel_set *const stuck = &f->state->stuck_axes[axis];
     const int32_t least = (int32_t)(HF_DEAD_SECONDS / HF_COMPARED_SECONDS);
     bool is_any_same = false;
     for (size_t i = 0; i < f->n_taxels; ++i) {
         holdfast_taxel *const taxel = &f->taxels[i];
-        if (readings[i] == taxel->compared[axis]) {
+        if (moved[i] == 0) {
             taxel->n_same[axis] += 1;
             is_any_same |= taxel->n_same[axis] >= least && f->used[i] > 0;
             continue;
@@ -475,7 +480,7 @@ static void hf_find_stuck_axis(const hf_finger *f, size_t axis)
         if (taxel->n_same[axis] > taxel->longest_same[axis] && !hf_has(stuck, i)) {
             taxel->longest_same[axis] = taxel->n_same[axis];
         }
-        taxel->compared[axis] = readings[i];
+        moved[i] = 0;
         taxel->n_same[axis] = 0;
         taxel->n_differed[axis] += 1;
     }

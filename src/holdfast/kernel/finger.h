@@ -50,6 +50,7 @@ typedef struct {
     hf_real *baseline;
     hf_real *reference;
     hf_real *changes;
+    hf_real *moved;
     hf_real *pressed; /* (n) */
     hf_real *shares;  /* (4, n) */
     hf_real *powers;  /* (2, n) */

@@ -13,11 +13,10 @@ typedef struct {
     int64_t changed_at;    /* n_changes of its finger when the taxel last changed */
     int64_t longest_still; /* most successive samples without a change, of those that changed the
                               finger */
-    /* Of each axis of a magnetometer, which is compared every 0.15 s: */
-    hf_real compared[3];     /* reading */
-    int32_t n_same[3];       /* comparisons since it last differed */
+    /* Of each axis of a magnetometer, in intervals of 0.15 s: */
+    int32_t n_same[3];       /* intervals since the last with a change */
     int32_t longest_same[3]; /* most of these that were no fault */
-    int32_t n_differed[3];   /* comparisons at which it differed */
+    int32_t n_differed[3];   /* intervals with a change */
 } holdfast_taxel;
 
 /* What replaces a taxel that is left out (masks.c). */
@@ -228,6 +227,8 @@ typedef struct {
     HF_ARRAY(hf_real, pressed, HOLDFAST_N_LANES);       /* |h_i . n| of the last sample */
     HF_ARRAY(hf_real, shares, 4 * HOLDFAST_N_LANES);    /* likewise, see sliding.c */
     HF_ARRAY(hf_real, changes, 3 * HOLDFAST_N_LANES);   /* last change of each taxel */
+    HF_ARRAY(hf_real, moved, 3 * HOLDFAST_N_LANES);     /* sum of the sizes of the changes of this
+                                                           interval of 0.15 s */
     HF_ARRAY(hf_real, powers, 2 * HOLDFAST_N_LANES);    /* smoothed mean squares of its first and
                                                            of its second differences */
     HF_ARRAY(hf_real, levels, HOLDFAST_N_LANES);        /* least of the second differences of each

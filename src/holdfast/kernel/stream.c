@@ -24,6 +24,7 @@ HF_SHARED hf_finger hf_finger_of(const holdfast_hand *hand, holdfast_memory *mem
     f.baseline = memory->baseline + 3 * first;
     f.reference = memory->reference + 3 * first;
     f.changes = memory->changes + 3 * first;
+    f.moved = memory->moved + 3 * first;
     f.pressed = memory->pressed + first;
     f.shares = memory->shares + 4 * first;
     f.powers = memory->powers + 2 * first;

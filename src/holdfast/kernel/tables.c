@@ -181,6 +181,7 @@ static uint64_t hf_lay_out(const holdfast_hand *hand, holdfast_memory *m, void *
     m->pressed = (hf_real *)hf_take(block, &used, lanes, width);
     m->shares = (hf_real *)hf_take(block, &used, 4 * lanes, width);
     m->changes = (hf_real *)hf_take(block, &used, 3 * lanes, width);
+    m->moved = (hf_real *)hf_take(block, &used, 3 * lanes, width);
     m->powers = (hf_real *)hf_take(block, &used, 2 * lanes, width);
     m->levels = (hf_real *)hf_take(block, &used, lanes, width);
     m->history = (hf_real *)hf_take(block, &used, rows * HF_N_COMPONENTS, width);

@@ -24,6 +24,7 @@ HF_SHARED void hf_begin_again(const hf_finger *f, double time)
     hf_fill(f->baseline, 3 * f->n, 0);
     hf_fill(f->reference, 3 * f->n, 0);
     hf_fill(f->changes, 3 * f->n, 0);
+    hf_fill(f->moved, 3 * f->n, 0);
     hf_fill(f->powers, 2 * f->n, 0);
     hf_begin_finger(f);
     s->last_time = time;

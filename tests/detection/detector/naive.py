@@ -189,6 +189,7 @@ class Finger:
         self.jumped, self.pending, self.offsets, self.shown = set(), {}, {}, 0.0
         self.rezeroed, self.rezeroed_at = False, NAN
         self.axes, self.stuck_axes = {}, [set(), set(), set()]
+        self.moved = np.zeros((sensor.n_taxels, 3), dtype=bool)  # since they were looked at
         self.field = self.still_field = np.zeros(3)
         self.common, self.speeds = np.zeros((2, 3)), np.zeros((2, 3))
         self.is_turned, self.is_load, self.n_unclear = False, False, 0
@@ -632,6 +633,7 @@ class Finger:
 
     def watch_taxels(self, before, now, fresh):
         self.n_news += 1
+        self.moved |= now != before
         for i, taxel in self.taxels.items():
             taxel.watch(before[i], now[i], self.n_news, fresh, len(self.samples), 0.5 / self.period)
         low, high = self.sensor.range or (-math.inf, math.inf)
@@ -666,22 +668,23 @@ class Finger:
 
     def compare_axis(self, axis, now, low, high):
         """Magnetometers of which one axis is the same for long, while those of others move."""
-        pasts = {i: self.axes.setdefault((i, axis), [0.0, 0, 0, 0]) for i in self.used}
+        pasts = {i: self.axes.setdefault((i, axis), [0, 0, 0]) for i in self.used}
         for i, past in pasts.items():
-            value, same, longest, n = past
-            if now[i][axis] == value:
-                past[1] += 1
-            else:
+            same, longest, n = past
+            if self.moved[i, axis]:
                 kept = longest if i in self.stuck_axes[axis] else max(longest, same)
-                past[:] = [now[i][axis], 0, kept, n + 1]
-        moving = [past[2] for past in pasts.values() if past[3] >= 10 and 0.15 * past[1] < 1]
+                past[:] = [0, kept, n + 1]
+            else:
+                past[0] += 1
+        self.moved[:, axis] = False
+        moving = [past[1] for past in pasts.values() if past[2] >= 10 and 0.15 * past[0] < 1]
         if len(moving) < 0.8 * len(self.used):
             return set()
         found = set()
-        for i, (value, same, longest, n) in pasts.items():
+        for i, (same, longest, n) in pasts.items():
             least = (2 if n >= 10 else 30) / 0.15
             before = longest if n >= 10 else max(longest, *moving)
-            if same >= max(least, 5 * (before + 1)) and low < value < high:
+            if same >= max(least, 5 * (before + 1)) and low < now[i][axis] < high:
                 found.add(i)
         return found
 
