@@ -196,13 +196,13 @@ static void hf_update_rest(const hf_finger *f, holdfast_decision *d)
     }
 }
 
-/* Let the force without contact follow slowly. */
-HF_SHARED void hf_follow(const hf_finger *f, holdfast_decision *d)
+/* Let the force without contact follow slowly. One of exact zeros does not drift. */
+HF_SHARED void hf_follow(const hf_finger *f, hf_real rest[3])
 {
     /* rest(k) = rest(k-1) + (T / tau) (F_tip(k) - rest(k-1)). */
     const hf_real share = hf_min(1, f->hand->period / HF_FOLLOW_SECONDS);
-    for (size_t axis = 0; axis < 3; ++axis) {
-        d->rest[axis] += share * (f->values->force[axis] - d->rest[axis]);
+    for (size_t axis = 0; axis < 3 && !f->finger->rests_at_zero; ++axis) {
+        rest[axis] += share * (f->values->force[axis] - rest[axis]);
     }
 }
 

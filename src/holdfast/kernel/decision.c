@@ -145,9 +145,7 @@ HF_SHARED void hf_decide(
     }
     if (unloaded) {
         d->filtered = HF_NAN;
-        if (!by_load) {
-            hf_follow(f, d);
-        }
+        hf_follow(f, by_load ? f->state->motion.contact_zero : d->rest);
     } else {
         state = hf_decide_contact(model, f, rule, d, phi, time);
     }

@@ -15,7 +15,7 @@ enum { HF_IN_CONTACT, HF_UNSTEADY, HF_WITHOUT_CONTACT };
 HF_SHARED int hf_find_contact(
     const hf_finger *f, const holdfast_rule *rule, holdfast_decision *d, bool zero_unknown,
     double time);
-HF_SHARED void hf_follow(const hf_finger *f, holdfast_decision *d);
+HF_SHARED void hf_follow(const hf_finger *f, hf_real rest[3]);
 
 /* heads.c */
 HF_SHARED hf_real

@@ -814,7 +814,7 @@ class Finger:
             state = "UNSTABLE"
         self.debounce(state, time, debounce.min_duration)
         self.decide_slip(fingers, time)
-        if state == "NO_CONTACT":
+        if state == "NO_CONTACT" and not self.sensor.rests_at_zero:
             self.rest += min(1, self.period / 3) * (np.array(self.force) - self.rest)
 
     def value(self, head, fingers):

@@ -36,8 +36,9 @@ def steps(*parts):
     return np.concatenate(shares)[:, None] * LOADED
 
 
-def test_an_empty_finger_is_without_contact():
-    states = states_of(np.zeros((2000, 3)))
+@pytest.mark.parametrize("drift", [0.0, 0.3])
+def test_an_empty_finger_is_without_contact(drift):
+    states = states_of(steps((1, 0), (60, drift)))
     assert (states[1:] == NO_CONTACT).all()
 
 
@@ -75,6 +76,7 @@ OPENED = {
     "9 % that creep": ((0.2, 0.09), (1, 0.07), (4, 0.06)),
     "4 % that stay for longer than the peak": ((0.2, 0.07), (1, 0.05), (2, 0.04), (40, 0.04)),
     "7 % that drift to 9": ((0.2, 0.07), (10, 0.09)),
+    "4 % that drift to 30": ((0.2, 0.04), (60, 0.3)),
 }
 HELD = {
     "15 % at once": ((0.2, 0.15), (8, 0.15)),
@@ -107,7 +109,7 @@ def test_a_touch_after_a_release_rises_from_what_that_left(name):
 
 
 def test_a_light_grip_is_held_and_released():
-    states = states_of(steps((1, 0), (0.2, 0.02), (5, 0.02), (0.2, 0), (3, 0)))
+    states = states_of(steps((1, 0), (0.2, 0.025), (5, 0.025), (0.2, 0), (3, 0)))
     assert (states[250:620] == STABLE).all()
     assert (states[690:] == NO_CONTACT).all()
 
