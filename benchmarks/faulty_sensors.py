@@ -284,8 +284,11 @@ def broken(readings: Values, start: int, digit: float) -> dict[str, tuple[Fault,
 
 
 def print_broken(recordings: Sequence[Recording], start: float) -> None:
-    """Print the time from a fault to its detection, and what is STABLE after it."""
-    print("| sensor | fault | found after [samples] | [s] | STABLE after it [%] |")
+    """Print the time from a fault to its detection, and what is STABLE after it and without it.
+
+    Of two equal taxels, one may be left out as a jump that stays, which hides the law.
+    """
+    print("| sensor | fault | found after [samples] | [s] | STABLE after it [%] | without it |")
     model = Model.load("builtin:any")
     for recording in recordings:
         name, module = next(iter(recording.modules.items()))
@@ -293,16 +296,19 @@ def print_broken(recordings: Sequence[Recording], start: float) -> None:
         k = int(np.searchsorted(module.times, module.times[0] + start))
         if k + 600 > len(readings):
             continue
+        clean = detect(model, Recording("clean", {name: module})).fingers[name]
         noise = np.abs(np.diff(readings[:k], axis=0)).mean()
-        for title, (fault, values) in broken(readings, k, module.sensor.step or noise / 50).items():
+        for title, (law, values) in broken(readings, k, module.sensor.step or noise / 50).items():
             made = Recording("made", {name: replace(module, readings=values)})
             trace = detect(model, made).fingers[name]
-            found = k + np.flatnonzero(trace.faults[k:] >> list(Fault).index(fault) & 1)
-            row = "- | - | -"
+            bits = [trace.faults >> list(Fault).index(x) & 1 for x in (law, Fault.INVALID)]
+            found = k + np.flatnonzero(max(bits, key=lambda bit: bit[k:].sum())[k:])
+            row = "- | - | - | -"
             if len(found):
                 at = found[0]
-                stable = 100 * (trace.state[at:] == STABLE).mean()
-                row = f"{at - k} | {trace.times[at] - trace.times[k]:.2f} | {stable:.0f}"
+                after, without = (100 * (x.state[at:] == STABLE).mean() for x in (trace, clean))
+                seconds = trace.times[at] - trace.times[k]
+                row = f"{at - k} | {seconds:.2f} | {after:.0f} | {without:.0f}"
             print(f"| `{module.sensor.name}` | {title} | {row} |")
 
 

@@ -154,6 +154,15 @@ class TestAxes:
         values[:, :, :2] = value
         assert not LAWS & {fault for e in estimates_of(values) for fault in e.faults}
 
+    def test_one_that_rests_while_two_taxels_toggle(self):
+        """A quiet hold of a sensor with steps."""
+        values = living(level=0.6)
+        values[START:, 2:] = 0.0
+        values[START:, :2] = values[START, :2]
+        values[START:, :2, 0] += np.random.default_rng(1).integers(0, 2, (N - START, 2))
+        quiet = estimates_of(values)[START : START + 600]
+        assert first_with(Fault.STUCK, quiet) is None
+
     def test_one_that_has_rested_for_long_may_rest_again(self):
         values = living()
         values[100:150, :, 0] = 30_000.0

@@ -34,29 +34,30 @@ enum {
 #define HF_RUN_FACTOR UINT64_C(0X9E6C63D0876A9A4B)
 #define HF_RUN_POWER UINT64_C(0X2A9DAC3FAA9F06C1)
 
-/* Append a sample to the runs of the lanes. Return false if it changes nothing. */
-static bool hf_append_update(holdfast_laws *w, const hf_scan *scan)
+/* Append a sample to the runs of the lanes. Return how many lanes it changes. */
+static size_t hf_append_update(holdfast_laws *w, const hf_scan *scan)
 {
     /* run = sum_j B^j h(k - j), of the hashes h of the last HF_RUN updates. */
     uint32_t *const oldest = &w->recent[w->n_updates % HF_RUN * HF_LANES];
     const uint32_t *const newest = &w->recent[(w->n_updates + HF_RUN - 1) % HF_RUN * HF_LANES];
-    uint32_t hashes[HF_LANES], changed = 0;
+    uint32_t hashes[HF_LANES];
+    size_t n_changed = 0;
     for (size_t l = 0; l < HF_LANES; ++l) {
         const double sum = (double)scan->lanes.lane[l];
         uint64_t bits;
         memcpy(&bits, &sum, sizeof bits);
         hashes[l] = (uint32_t)(((bits ^ bits >> 32) + l + 1) * HF_HASH_FACTOR >> 32);
-        changed |= hashes[l] ^ newest[l];
+        n_changed += hashes[l] != newest[l];
     }
-    if (!changed) {
-        return false;
+    if (n_changed == 0) {
+        return 0;
     }
     for (size_t l = 0; l < HF_LANES; ++l) {
         w->runs[l] = w->runs[l] * HF_RUN_FACTOR + hashes[l] - oldest[l] * HF_RUN_POWER;
         oldest[l] = hashes[l];
     }
     w->n_updates += 1;
-    return true;
+    return n_changed;
 }
 
 /* Return whether three of the last updates differ without a lane. Two in turn are no ring: readings
@@ -142,15 +143,19 @@ HF_SHARED void hf_forget_returns(const hf_finger *f)
     f->laws->n_left = 0;
 }
 
-/* Return whether an axis of all taxels is frozen, or equal to another, while others change. */
-static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
+/* Return whether an axis of all taxels is frozen, or equal to another, while others change.
+ *
+ * is_wide: taxels of all lanes but one change. In a hold of a sensor with steps, one or two taxels
+ * go on to toggle, of which any axis may rest. */
+static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan, bool is_wide)
 {
-    /* Frozen: more than half of the updates before the rest changed it, 0.5 s of updates at least,
-     * and the rest lasts max(0.5 s, 10 (longest rest before + 1 sample)) of updates. */
+    /* Frozen: more than half of the wide updates before the rest changed it, 0.5 s of them at
+     * least, and the rest lasts max(0.5 s, 10 (longest rest before + 1 sample)) of them. */
     holdfast_laws *const w = f->laws;
     const hf_real *const now = scan->axes;
     const hf_real then[3] = {w->axes[0], w->axes[1], w->axes[2]};
     memcpy(w->axes, now, sizeof w->axes);
+    w->n_wide += is_wide;
     if (!w->is_resting && now[0] != then[0] && now[1] != then[1] && now[2] != then[2] &&
         now[0] != now[1] && now[1] != now[2] && now[2] != now[0]) {
         return false; /* as usual */
@@ -160,15 +165,15 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan)
     w->is_resting = false;
     for (size_t axis = 0; axis < 3; ++axis) {
         const bool is_new = now[axis] != then[axis];
-        const int64_t same = w->n_same[axis], n_changed = w->n_updates - w->n_rested[axis];
+        const int64_t same = w->n_same[axis], n_changed = w->n_wide - w->n_rested[axis];
         const hf_real limit = HF_FROZEN_RATIO * (hf_real)(w->longest_rest[axis] + 1);
-        const bool is_frozen = 2 * n_changed > w->n_updates - same && (hf_real)n_changed >= least &&
+        const bool is_frozen = 2 * n_changed > w->n_wide - same && (hf_real)n_changed >= least &&
                                (hf_real)same >= hf_max(least, limit);
         if (is_new && same > w->longest_rest[axis] && !is_frozen) {
             w->longest_rest[axis] = same;
         }
-        w->n_same[axis] = is_new ? 0 : same + 1;
-        w->n_rested[axis] += !is_new;
+        w->n_same[axis] = is_new ? 0 : same + is_wide;
+        w->n_rested[axis] += is_wide && !is_new;
         w->n_equal[axis] = now[axis] == now[(axis + 1) % 3] ? w->n_equal[axis] + is_new : 0;
         w->is_resting |= !is_new || w->n_equal[axis] > 0;
         is_stuck |= w->n_equal[axis] >= HF_MIN_SHARED || (is_frozen && !is_new && now[axis] != 0);
@@ -246,12 +251,13 @@ HF_SHARED uint32_t hf_broken_laws(const hf_finger *f, const hf_scan *scan)
 {
     holdfast_laws *const w = f->laws;
     w->total = scan->total;
-    w->has_changed = hf_append_update(w, scan);
+    const size_t n_changed = hf_append_update(w, scan);
+    w->has_changed = n_changed > 0;
     if (!w->has_changed) {
         return w->faults;
     }
     w->faults = hf_return(f) ? HOLDFAST_REPEATED : 0;
-    if (hf_has_stuck_axis(f, scan)) {
+    if (hf_has_stuck_axis(f, scan, n_changed >= HF_LANES - 1 || n_changed >= f->n_taxels)) {
         w->faults |= HOLDFAST_STUCK;
     }
     if (w->is_watching) {

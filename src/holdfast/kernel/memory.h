@@ -42,10 +42,11 @@ typedef struct {
     bool is_repeated;                      /* enough readings and channels of it differ */
     /* Axes: */
     hf_real axes[3];      /* sums of the readings */
-    int64_t n_rested[3];  /* updates that left an axis as it was */
+    int64_t n_wide;       /* updates of all lanes but one; the next three count these */
+    int64_t n_rested[3];  /* that left an axis as it was */
     int64_t n_same[3];    /* the last of these in a row */
+    int64_t longest_rest[3]; /* most in a row that did, by no fault */
     int64_t n_equal[3];   /* changes of the axis while it was equal to the next one */
-    int64_t longest_rest[3]; /* most updates in a row that left it as it was, by no fault */
     bool is_resting;      /* some axis did not change, or is equal to another */
     /* Taxels: */
     size_t taxel;              /* that is compared with the others at this update */

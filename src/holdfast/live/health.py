@@ -188,13 +188,15 @@ def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> M
         raise SourceError(
             f"{name}: {len(times)} samples given, at least {MIN_CHECKED_SAMPLES} expected"
         )
-    valid, lone = _valid(readings)
+    valid, lone = _valid(sensor, readings)
     changes = np.diff(valid, axis=0)
     noise = np.sqrt(np.nanmean(changes**2, axis=0) / 2)
     steps = np.diff(times)
     period = float(np.median(steps))
     is_gap = steps > GAP_PERIODS * period
     still = ~(np.nan_to_num(changes) != 0).any(axis=0)
+    if sensor.rests_at_zero:
+        still &= valid[0] != 0
     usual = _usual_noise(valid)
     moves = _moves(sensor, times, valid, usual, valid)
     if moves.touched.any():
@@ -237,7 +239,7 @@ def first_touch(name: str, sensor: Sensor, times: Array, readings: Array) -> flo
     """
     if len(times) < MIN_CHECKED_SAMPLES:
         return None  # `module_health` refuses it
-    valid, _ = _valid(readings)
+    valid, _ = _valid(sensor, readings)
     n = max(MIN_CHECKED_SAMPLES, int(np.searchsorted(times, times[0] + OPEN_SECONDS)))
     moves = _moves(sensor, times, valid, _usual_noise(valid[:n]), valid[:n])
     if not moves.touched.any():
@@ -267,10 +269,10 @@ class _Moves(NamedTuple):
     field: Array
 
 
-def _valid(readings: Array) -> tuple[Array, Flags]:
+def _valid(sensor: Sensor, readings: Array) -> tuple[Array, Flags]:
     """Return readings with NaN for lone zeros and what is not finite; and where zeros are lone."""
     zeros = (readings == 0).all(axis=2)
-    lone = zeros & ~zeros.all(axis=0)
+    lone = zeros & ~zeros.all(axis=0) & (not sensor.rests_at_zero)
     return np.where(lone[:, :, None] | ~np.isfinite(readings), np.nan, readings), lone
 
 

@@ -21,8 +21,8 @@ class Laws:
         self.pauses = [0]  # numbers of updates before a pause
         self.n_left = self.n_returned = 0
         self.is_repeated = False
-        self.changed = [[], [], []]  # of each axis, whether each update changed it
-        self.longest, self.n_equal = [0, 0, 0], [0, 0, 0]
+        self.changed = [[], [], []]  # of each axis, whether each wide update changed it
+        self.same, self.longest, self.n_equal = [0, 0, 0], [0, 0, 0], [0, 0, 0]
         self.taxel, self.alike, self.n_watched, self.n_alike = 0, set(), 0, 0
         self.levels, self.n_levelled, self.n_settled, self.n_steady = {}, 0, 0, 0
 
@@ -37,7 +37,9 @@ class Laws:
         last = np.sum(self.lanes[-1], axis=0) if self.lanes else np.zeros(3)
         self.lanes = [*self.lanes, lanes]
         self.faults = {"repeated"} if self.has_returned(now, before, taxels, n_news) else set()
-        if self.has_stuck_axis(sums, last):
+        old = self.lanes[-2] if len(self.lanes) > 1 else [None] * 4
+        n_new = sum(a != b for a, b in zip(lanes, old, strict=True))
+        if self.has_stuck_axis(sums, last, n_new >= min(3, self.n_taxels)):
             self.faults.add("stuck")
         self.compare_taxels(now, before)
 
@@ -72,17 +74,17 @@ class Laws:
                 self.is_repeated |= n_varying >= (12 if left_out is None else 9)
         return self.is_repeated
 
-    def has_stuck_axis(self, sums, last):
+    def has_stuck_axis(self, sums, last, is_wide):
         found, least = False, 0.5 / self.period
         for axis in range(3):
             is_new, past = bool(sums[axis] != last[axis]), self.changed[axis]
-            same = next((k for k, new in enumerate(reversed(past)) if new), len(past))
-            n_changed = sum(past) + is_new
-            is_frozen = 2 * n_changed > len(past) + 1 - same and n_changed >= least
+            same, n_changed = self.same[axis], sum(past) + is_wide
+            is_frozen = 2 * n_changed > len(past) + is_wide - same and n_changed >= least
             is_frozen &= same >= max(least, 10 * (self.longest[axis] + 1))
             if is_new and not is_frozen:
                 self.longest[axis] = max(self.longest[axis], same)
-            past.append(is_new)
+            self.same[axis] = 0 if is_new else same + is_wide
+            past.extend([is_new] * is_wide)
             is_equal = sums[axis] == sums[(axis + 1) % 3]
             self.n_equal[axis] = self.n_equal[axis] + is_new if is_equal else 0
             found |= self.n_equal[axis] >= 20 or (is_frozen and not is_new and sums[axis] != 0)
