@@ -28,7 +28,9 @@ def compiled(compiler, path, folder, *flags):
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-@pytest.mark.parametrize("name", ["kernel/module.c", "kernel/offline.c", "twin/c/module.c"])
+@pytest.mark.parametrize(
+    "name", ["kernel/module.c", "kernel/module_avx2.c", "kernel/offline.c", "twin/c/module.c"]
+)
 def test_no_warning_as_the_extension_is_built(compiler, name, tmp_path):
     assert compiled(compiler, PACKAGE / name, tmp_path, "-O3", *EXTENSION) == (0, "")
 

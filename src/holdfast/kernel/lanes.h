@@ -5,7 +5,8 @@
  * compilers get the same bits. Lanes without a taxel, and ignored taxels, add 0.
  *
  * A loop takes HF_WIDTH of the lanes at a time: with GCC and Clang on x86 with SSE2 and on
- * 64-bit ARM 16 bytes, a vector register, at any level of optimisation; else one number:
+ * 64-bit ARM 16 bytes, a vector register, at any level of optimisation, with AVX2 all four; else
+ * one number:
  *
  *     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
  *         hf_wide part = {0};
@@ -32,25 +33,32 @@ static inline hf_real hf_min(hf_real a, hf_real b)
     return b < a ? b : a;
 }
 
-#ifdef __SSE2__
-#include <emmintrin.h>
 #ifdef HOLDFAST_SINGLE
+typedef int32_t hf_bits;
 #define HF_SSE2(name) _mm_##name##_ps
+#else
+typedef int64_t hf_bits;
+#ifdef __AVX2__
+#define HF_VECTOR 32
+#define HF_SSE2(name) _mm256_##name##_pd
 #else
 #define HF_SSE2(name) _mm_##name##_pd
 #endif
 #endif
+#ifndef HF_VECTOR
+#define HF_VECTOR 16 /* bytes */
+#endif
+#ifdef __SSE2__
+#include <immintrin.h>
+#endif
 
 #if defined(__GNUC__) && (defined(__SSE2__) || defined(__aarch64__))
-enum { HF_WIDTH = 16 / sizeof(hf_real) };
-typedef hf_real hf_wide __attribute__((vector_size(16)));
+enum { HF_WIDTH = HF_VECTOR / sizeof(hf_real) };
+typedef hf_real hf_wide __attribute__((vector_size(HF_VECTOR)));
 /* The same in an array of numbers: compilers know that it aliases numbers alone. */
-typedef hf_real hf_wide_in_memory __attribute__((vector_size(16), aligned(sizeof(hf_real))));
-#ifdef HOLDFAST_SINGLE
-typedef int32_t hf_wide_bits __attribute__((vector_size(16)));
-#else
-typedef int64_t hf_wide_bits __attribute__((vector_size(16)));
-#endif
+typedef hf_real hf_wide_in_memory
+    __attribute__((vector_size(HF_VECTOR), aligned(sizeof(hf_real))));
+typedef hf_bits hf_wide_bits __attribute__((vector_size(HF_VECTOR)));
 
 /* Return b where a comparison holds, else a. */
 static inline hf_wide hf_where(hf_wide_bits holds, hf_wide b, hf_wide a)
@@ -82,7 +90,7 @@ static inline hf_wide hf_wide_abs(hf_wide a)
 /* Return a where it is smaller, else b. SSE2 has an instruction, which not all compilers find. */
 static inline hf_wide hf_smaller(hf_wide a, hf_wide b)
 {
-#ifdef HF_SSE2
+#ifdef __SSE2__
     return HF_SSE2(min)(a, b);
 #else
     return hf_where(a < b, a, b);
@@ -92,7 +100,7 @@ static inline hf_wide hf_smaller(hf_wide a, hf_wide b)
 /* Return a where it is larger, else b. */
 static inline hf_wide hf_greater(hf_wide a, hf_wide b)
 {
-#ifdef HF_SSE2
+#ifdef __SSE2__
     return HF_SSE2(max)(a, b);
 #else
     return hf_where(a > b, a, b);
@@ -116,7 +124,7 @@ static inline void hf_store(hf_real *values, hf_wide a)
 /* Return the square roots. */
 static inline hf_wide hf_root(hf_wide a)
 {
-#ifdef HF_SSE2
+#ifdef __SSE2__
     return HF_SSE2(sqrt)(a);
 #else
     hf_real values[HF_WIDTH];

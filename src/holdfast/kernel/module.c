@@ -17,6 +17,15 @@
 #include "holdfast.h"
 #include "finger.h"
 
+/* A function of the kernel; that of module_avx2.c where the processor has AVX2. */
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+extern __typeof__(holdfast_advance) *const holdfast_advance_avx2;
+extern __typeof__(holdfast_detect) *const holdfast_detect_avx2;
+#define WIDEST(function) (__builtin_cpu_supports("avx2") ? function##_avx2 : function)
+#else
+#define WIDEST(function) function
+#endif
+
 /* The size of the scratch memory of a longer window, ten rows of doubles, could overflow. */
 #define MAX_WINDOW (PY_SSIZE_T_MAX / 1024)
 
@@ -265,7 +274,7 @@ static void advance_all(
         for (size_t f = 0; f < n_fingers; ++f) {
             s->present[f] = *is_present++ != 0;
         }
-        holdfast_advance(
+        WIDEST(holdfast_advance)(
             &s->hand, &s->memory, readings->data + 3 * s->n_taxels * k, s->present, times->data[k]);
         memcpy(features->data + width * k, s->memory.features, width * sizeof(double));
         for (size_t f = 0; f < n_fingers; ++f) {

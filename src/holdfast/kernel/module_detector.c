@@ -390,7 +390,7 @@ static PyObject *process(detector *s, const double *readings, double time)
 {
     copy_states(s, s->before);
     s->base.last_time = time;
-    holdfast_detect(&s->model, &s->d, time, readings, s->base.present, s->estimates);
+    WIDEST(holdfast_detect)(&s->model, &s->d, time, readings, s->base.present, s->estimates);
     copy_states(s, s->after);
     PyObject *result = make_hand(s, time);
     if (result != NULL && note_change(s, time, s->before, s->after) < 0) {
@@ -457,7 +457,7 @@ static void run_all(
         for (size_t f = 0; f < n_fingers; ++f) {
             s->base.present[f] = *is_present++ != 0;
         }
-        states[k] = holdfast_detect(
+        states[k] = WIDEST(holdfast_detect)(
             &s->model, &s->d, times->data[k], readings->data + 3 * s->base.n_taxels * k,
             s->base.present, rows + n_fingers * k);
     }

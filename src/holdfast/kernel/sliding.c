@@ -62,11 +62,15 @@ static inline hf_real *hf_slide_at(const hf_finger *f, size_t index)
     return f->slides + index * 3 * HF_N_LANES(f->hand);
 }
 
-/* Return the mean of a smoothed value after a step in time. */
-static hf_real hf_smoothed(hf_real mean, hf_real value, hf_real step, hf_real seconds)
+/* Return the share of a new value in a mean over some time, after a step in time. */
+static inline hf_real hf_gain(hf_real step, hf_real seconds)
 {
-    /* a(k) = a(k-1) + step / (step + seconds) (v(k) - a(k-1)). */
-    return isnan(mean) ? value : mean + step / (step + seconds) * (value - mean);
+    return step / (step + seconds);
+}
+
+static inline hf_real hf_smoothed(hf_real mean, hf_real value, hf_real gain)
+{
+    return isnan(mean) ? value : mean + gain * (value - mean); /* a(k-1) + gain (v(k) - a(k-1)) */
 }
 
 /* Return the kinds of sliding that some lag needs. */
@@ -100,33 +104,23 @@ static hf_real hf_store_slide(const hf_finger *f, size_t now)
     return hf_total_of(&load);
 }
 
-/* Store the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0). */
-static void hf_store_bands(const hf_finger *f, size_t now, hf_real s)
+/* Store the squares of |T_i| + 2 s and of max(|T_i| - 2 s, 0); return
+ * sum |N_i| min(|T_i| / max(|N_i|, 5 s), 5). */
+static hf_real hf_sum_shears(const hf_finger *f, size_t now, hf_real s)
 {
     const size_t n = f->n;
     const hf_real *const own = hf_slide_at(f, now);
     hf_real *const shares = f->shares;
     const hf_wide none = {0}, band = none + HF_SHARE_NOISE * s;
-    for (size_t i = 0; i < n; i += HF_WIDTH) {
-        const hf_wide x = hf_load(own + i), y = hf_load(own + n + i);
-        const hf_wide shear = hf_root(x * x + y * y);
-        const hf_wide low = hf_greater(shear - band, none), high = shear + band;
-        hf_store(shares + n + i, high * high);
-        hf_store(shares + 2 * n + i, low * low);
-    }
-}
-
-/* Return sum |N_i| min(|T_i| / max(|N_i|, 5 s), 5). */
-static hf_real hf_sum_friction(const hf_finger *f, size_t now, hf_real s)
-{
-    const size_t n = f->n;
-    const hf_real *const own = hf_slide_at(f, now);
-    const hf_wide none = {0}, least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
+    const hf_wide least = none + HF_LEAST_TAXEL_LOAD * s, most = none + HF_MAX_FRICTION;
     hf_parts friction = hf_no_parts();
     for (size_t i = 0; i < n;) {
         for (size_t l = 0; l < HF_N_WIDE; ++l, i += HF_WIDTH) {
             const hf_wide x = hf_load(own + i), y = hf_load(own + n + i);
-            const hf_wide pressed = hf_load(f->shares + i), shear = hf_root(x * x + y * y);
+            const hf_wide pressed = hf_load(shares + i), shear = hf_root(x * x + y * y);
+            const hf_wide low = hf_greater(shear - band, none), high = shear + band;
+            hf_store(shares + n + i, high * high);
+            hf_store(shares + 2 * n + i, low * low);
             friction.part[l] += pressed * hf_smaller(shear / hf_greater(pressed, least), most);
         }
     }
@@ -217,13 +211,11 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
     const hf_real load = hf_store_slide(f, now), least = HF_LEAST_LOAD * m->force_noise;
     m->weight = hf_max(load, HF_TINY);
     m->load = hf_max(load, least);
-    if (hf_needs(kinds, HF_FALLING_SHARE, HF_RISING_SHARE)) {
-        hf_store_bands(f, now, m->noise);
-    }
     hf_real friction = 0, centre[3] = {0};
-    if (hf_needs(kinds, HF_TAXEL_FRICTION, HF_TAXEL_FRICTION) ||
+    if (hf_needs(kinds, HF_FALLING_SHARE, HF_RISING_SHARE) ||
+        hf_needs(kinds, HF_TAXEL_FRICTION, HF_TAXEL_FRICTION) ||
         hf_needs(kinds, HF_TAXEL_FRICTION_RISE, HF_TAXEL_FRICTION_RISE)) {
-        friction = hf_sum_friction(f, now, m->noise);
+        friction = hf_sum_shears(f, now, m->noise);
     }
     if (hf_needs(kinds, HF_CENTRE_SHIFT, HF_CENTRE_SHIFT)) {
         hf_sum_centre(f, centre);
@@ -249,7 +241,8 @@ HF_SHARED void hf_append_slide(const hf_finger *f, size_t now, double time, hf_r
         m->block_start = time;
     }
     if (hf_needs(kinds, HF_FRICTION_MARGIN, HF_FRICTION_MARGIN)) {
-        m->friction = hf_smoothed(m->friction, track->friction, step, HF_FRICTION_SECONDS);
+        m->friction = hf_smoothed(
+            m->friction, track->friction, hf_gain(step, HF_FRICTION_SECONDS));
         hf_note_friction(m, time);
     }
 }
@@ -390,12 +383,13 @@ HF_SHARED void hf_fill_energies(
     hf_sum_fast(f, at, energies);
     const hf_real share = 1 / (f->state->slide.noise * f->state->slide.noise);
     for (int j = 0; j <= HF_N_ENERGY_TIMES; ++j) {
+        const hf_real gain = j > 0 ? hf_gain(step, HF_ENERGY_SECONDS[j - 1]) : 1;
         for (int i = 0; i < HF_N_ENERGIES; ++i) {
             const int kind = HF_FAST + j * HF_N_ENERGIES + i;
             if (hf_needs(kinds, kind, kind)) {
                 hf_real *const mean = j > 0 ? &averages[(j - 1) * HF_N_ENERGIES + i] : &energies[i];
                 if (j > 0) {
-                    *mean = hf_smoothed(*mean, energies[i], step, HF_ENERGY_SECONDS[j - 1]);
+                    *mean = hf_smoothed(*mean, energies[i], gain);
                 }
                 out[kind] = hf_log(1 + share * *mean) / 2; /* log sqrt(1 + v^2 / s^2) */
             }
