@@ -20,7 +20,9 @@ from setuptools.command.build_ext import build_ext
 
 PACKAGE = Path("src/holdfast")  # backends run in the folder of pyproject.toml
 EXTENSIONS = {
-    "kernel._extension": [f"kernel/{name}.c" for name in ("module", "module_avx2", "haar", "force", "offline")],
+    "kernel._extension": [
+        f"kernel/{name}.c" for name in ("module", "module_avx2", "haar", "force", "offline")
+    ],
     "twin.steps": ["twin/c/module.c"],
 }
 """Names of the extension modules, and the C files that are compiled for each."""

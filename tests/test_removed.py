@@ -12,6 +12,7 @@ COMMANDS = {
     "hands": "hold builtin:any . --hand {}:",
     "labels": "label export {} out .",
     "rules": "info {}.json",
+    "features": "info {}.json",
 }
 """Command with a part of each kind."""
 
@@ -23,7 +24,8 @@ def test_what_was_removed_is_one_line_with_what_to_use_instead(
     kind, name, capsys, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / f"{name}.json").write_text(f'{{"rule": {{"type": "{name}"}}}}')
+    key = "type" if kind == "rules" else "kind"
+    (tmp_path / f"{name}.json").write_text(f'{{"rule": {{"{key}": "{name}"}}}}')
     message = Verb().refusal(capsys, *COMMANDS[kind].format(name).split())
     assert LAST_COMMIT in message
     assert message.endswith(REMOVED[kind][name])

@@ -87,6 +87,17 @@ REMOVED: dict[str, dict[str, str]] = {
         "onnx": "train a model with holdfast train, or apply a classifier of your own to what "
         "holdfast.features_frame returns",
     },
+    "features": dict.fromkeys(
+        (
+            *(
+                f"{mean}second_{what}"
+                for mean in ("", "mean_")
+                for what in ("all", "shared", "shear", "own", "top")
+            ),
+            *(f"{what}_gain" for what in ("shear", "normal", "ratio")),
+        ),
+        "train or teach the model again",
+    ),
     "files": {
         "holdfast.toml": WRITTEN_OUT,
     },
@@ -101,8 +112,9 @@ REMOVED: dict[str, dict[str, str]] = {
     },
 }
 """What to use instead, by kind and name. The kinds are those of `PACKAGE_PARTS` of `errors.py`:
-`verbs`, `options`, `sources`, ..., and `labels` (formats of labels), `rules` (of heads in model
-files), `files` and `plugins` (kinds of them). An option has its verb before it: "serve --hand"."""
+`verbs`, `options`, `sources`, ..., and `labels` (formats of labels), `rules` and `features` (of
+heads in model files), `files` and `plugins` (kinds of them). An option has its verb before it:
+"serve --hand"."""
 
 
 def removal(kind: str, name: str, what: str) -> str:

@@ -1,6 +1,5 @@
 """Heads of a finger: what is refused, and what a rule and its link make of the features."""
 
-import json
 import math
 
 import pytest
@@ -22,7 +21,6 @@ from holdfast.contact import CAUSES, Cause
 from holdfast.detection import ANY_FINGER, FeatureSpec, FingerModel, Linear, Model
 from holdfast.detection.heads import HEAD_NAMES, Head
 from holdfast.errors import ModelError
-from holdfast.removed import LAST_COMMIT, REMOVED
 
 STABLE, SLIP = stable_head(SLIP_OWN), squared_head(SLIP_OWN)
 SPEED, CAUSE = speed_head(SLIP), cause_head(SLIP_OWN)
@@ -71,19 +69,6 @@ def test_fields_that_contradict_each_other_are_refused(head, changes, message):
         replace(head, **changes)
 
 
-def test_a_head_of_onnx_is_refused_with_what_to_use_instead(tmp_path):
-    fields = json.loads(Model(fingers={ANY_FINGER: finger_model()}).encoded())
-    head = fields["fingers"][ANY_FINGER]["heads"][0]
-    head["rule"] = {"type": "onnx", "file": "a.onnx", "sha256": "0" * 64, "n_features": 3}
-    path = tmp_path / "model.json"
-    path.write_text(json.dumps(fields))
-    with pytest.raises(ModelError) as raised:
-        Model.load(path)
-    assert str(raised.value).startswith(f"{path}: the ONNX classifier of this model was removed")
-    assert LAST_COMMIT in str(raised.value)
-    assert str(raised.value).endswith(REMOVED["rules"]["onnx"])
-
-
 @pytest.mark.parametrize(
     ("heads", "message"),
     [
@@ -130,8 +115,6 @@ def test_features_that_compare_taxels_need_two():
     hand_model = Model(fingers={ANY_FINGER: part.with_heads(squared_head(TAXELS))})
     assert hand_model.blind_features("thumb", sensor(2)) == ()
     assert hand_model.blind_features("thumb", sensor(1)) == (
-        "second_shared", "second_own", "second_top",
-        "mean_second_shared", "mean_second_own", "mean_second_top",
         "centre_shift", "divergence", "relative_divergence",
         "fast_own", "fast_own_30ms", "fast_own_100ms", "fast_own_400ms",
     )  # fmt: skip

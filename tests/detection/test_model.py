@@ -381,7 +381,7 @@ class TestTwin:
         part = hand_model.fingers[ANY_FINGER]
         assert part.stable.features == parse_features("holdfast")
         assert part.slip.features == SLIP_FEATURES
-        assert len(part.slip.rule.squares[0]) == len(part.features) == 39
+        assert len(part.slip.rule.squares[0]) == len(part.features) == len(SLIP_FEATURES)
         assert [head.name for head in part.heads] == ["stable", "slip", "slip_speed", "cause"]
         assert part.sensor == "uskin-curved"
         assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}

@@ -10,17 +10,12 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Tare
 from holdfast.detection.features import extract
-from holdfast.detection.kernel_config import (
-    AVERAGE_SECONDS,
-    COUNT_NOISE,
-    NEWTON_NOISE,
-    stream_config,
-)
+from holdfast.detection.kernel_config import COUNT_NOISE, NEWTON_NOISE, stream_config
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
     ANY_FEATURES,
     ANY_LAGS,
-    SLIP_FEATURES,
+    SLIDING_FEATURES,
     FeatureSpec,
     kinds_of,
 )
@@ -29,8 +24,7 @@ from holdfast.sensors import Sensor
 from holdfast.sensors import sensor as built_in
 
 RATE = 100.0
-NEEDED = ("changes", "seconds", "means", "ratios")
-MOTION_KINDS = kinds_of("change", "load", "second", "mean_second", "ratio")
+MOTION_KINDS = kinds_of("change", "load")
 EVERY = tuple(
     FeatureSpec(kind, transform="relative", seconds=lag)
     for kind in MOTION_KINDS
@@ -63,8 +57,6 @@ def naive(readings, given, rate=RATE):
     moment = np.array([normal @ np.cross(places, sample).sum(axis=0) for sample in f])
     norm = lambda vectors: np.sqrt((vectors**2).sum())  # noqa: E731
     peak = peak_taxels = 0.0
-    ratios = np.zeros(len(f))
-    averages = np.full((len(ANY_LAGS), 5), np.nan)
     least = math.inf, math.inf
     block, began = [], 0.0
     rows = np.full((len(f), len(MOTION_KINDS) * len(ANY_LAGS)), np.nan)
@@ -85,11 +77,6 @@ def naive(readings, given, rate=RATE):
         elif math.isinf(least[0]):
             now = floor, floor
         noise, taxel_noise = now
-        beyond = total[k] - total[reference]
-        shear_force = beyond - beyond @ normal * normal
-        floor_force = abs(beyond @ normal) + 10 * noise
-        ratios[k] = norm(shear_force) / floor_force
-        tangent = shear_force / norm(shear_force) if norm(shear_force) else shear_force
         if k < 1:
             continue
         whole, of_taxels = peak + 100 * noise, peak_taxels + 100 * taxel_noise
@@ -113,31 +100,8 @@ def naive(readings, given, rate=RATE):
                 relative(turned**2, math.sqrt(1 / 3) * taxel_noise, whole),
                 whole / noise,
             ]
-            back = min(max(1, round(seconds * rate)), k // 2)
-            squares = second_squares(f, k, back, weights[k], normal)
-            share = 1 - math.exp(-1 / rate / AVERAGE_SECONDS)
-            is_first = np.isnan(averages[i, 0])
-            averages[i] = squares if is_first else averages[i] + share * (squares - averages[i])
-            seconds_of = np.concatenate([squares, averages[i]]) / taxel_noise**2
-            seconds_of = np.log(np.maximum(seconds_of - 6, 0) + 6 / 16) / 2
-            gains = [change @ tangent / floor_force, change @ normal / floor_force]
-            gains.append(ratios[k] - ratios[j])
-            rows[k, i :: len(ANY_LAGS)] = [*np.log(values), *seconds_of, *gains]
+            rows[k, i :: len(ANY_LAGS)] = np.log(values)
     return rows
-
-
-def second_squares(forces, k, back, pressed, normal):
-    """Squared second differences: of all taxels, by load, against the common motion, largest."""
-    d = forces[k] - 2 * forces[k - back] + forces[k - 2 * back]
-    n = len(d)
-    shares = pressed / pressed.sum() if pressed.sum() else np.zeros(n)
-    squares = (d**2).sum(axis=1)
-    shear = ((d - (d @ normal)[:, None] * normal) ** 2).sum(axis=1)
-    own = d - shares[:, None] * d.sum(axis=0)
-    top = max(squares[pressed > pressed.mean()], default=0.0)
-    return np.array(
-        [squares.sum(), n * shares @ squares, n * shares @ shear, (own**2).sum(), n * top]
-    )
 
 
 def sensor(name):
@@ -230,58 +194,13 @@ def test_a_common_motion_of_the_taxels_leaves_no_residual():
     assert found[80, residual] < -5
 
 
-def of_kinds(kinds, seconds=0.02):
-    return tuple(FeatureSpec(kind, transform="relative", seconds=seconds) for kind in kinds)
-
-
-def test_a_second_difference_does_not_see_a_steady_motion_but_a_jolt():
-    given = sensor("papillarray")
-    readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
-    readings[40:] += np.linspace(0, 1, 50)[:, None, None]
-    readings[80:, 4] += 0.01
-    found = features_of(readings, given, specs=of_kinds(kinds_of("second", "mean_second")))
-    assert (np.abs(found[60:80, :5]) < 1.5).all()
-    assert (found[80, [0, 3]] > 2.5).all()
-    assert (found[80, [5, 8]] < found[80, [0, 3]]).all()
-    assert (found[86, [5, 8]] > found[86, [0, 3]]).all()  # the averages remember it
-
-
-def test_the_own_second_difference_leaves_out_a_common_jolt():
-    given = sensor("papillarray")
-    readings = 1e-4 * np.random.default_rng(0).normal(size=(90, 9, 3))
-    readings[40:] += [0.0, 0.0, 1.0]  # an even load: all taxels have the same share
-    readings[80:] += [0.01, 0.0, 0.0]
-    every, own = features_of(readings, given, specs=of_kinds(("second_all", "second_own")))[80]
-    assert every > 3
-    assert own < 0.5
-
-
-def test_the_ratio_rises_with_shear_and_falls_with_load():
-    given = sensor("papillarray")
-    kinds = of_kinds(("shear_gain", "normal_gain", "ratio_gain"), seconds=0.1)
-    readings = 1e-5 * np.random.default_rng(0).normal(size=(120, 9, 3))
-    readings[40:, :, 2] += 1.0
-    readings[60:, :, 0] += 0.5
-    sheared = features_of(readings, given, specs=kinds)[60]
-    assert sheared[0] > 0.1
-    assert abs(sheared[1]) < 0.05
-    assert sheared[2] > 0.1
-    readings[80:, :, 2] += 1.0
-    pressed = features_of(readings, given, specs=kinds)[80]
-    assert abs(pressed[1]) > 0.2
-    assert pressed[2] < -0.1
-
-
-def test_a_stream_computes_only_the_kinds_that_it_needs():
+def test_a_stream_computes_only_the_families_that_it_needs():
     given = sensor("uskin-4x4")
-    plan = StreamPlan({"a": given}, {"a": SLIP_FEATURES}, 14, Tare.parse("first"), 150.0)
-    lags = stream_config(plan).lags
-    assert [lag["samples"] for lag in lags] == [1, 2, 4, 16]
-    needed = [[lag[f"has_{what}"] for what in NEEDED] for lag in lags]
-    assert needed == [[0, 1, 1, 1], [0, 1, 0, 0], [0, 0, 0, 1], [0, 0, 0, 1]]
     plan = StreamPlan({"a": given}, {"a": ANY_FEATURES}, 14, Tare.parse("first"), 150.0)
-    lags = stream_config(plan).lags
-    assert [[lag[f"has_{what}"] for what in NEEDED] for lag in lags] == [[1, 0, 0, 0]] * 5
+    assert stream_config(plan).lags["has_changes"].all()
+    assert not stream_config(plan).lags["sliding"].any()
+    plan = replace(plan, features={"a": SLIDING_FEATURES})
+    assert not stream_config(plan).lags["has_changes"].any()
 
 
 @pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
@@ -326,12 +245,6 @@ def test_one_taxel_has_floors_and_no_nan():
 def test_specifications_that_contradict_themselves_are_refused(fields, message):
     with pytest.raises(ValueError, match=message):
         FeatureSpec(**fields)
-
-
-def test_the_list_for_slips():
-    assert len(SLIP_FEATURES) == 39
-    assert str(SLIP_FEATURES[15]) == "relative(second_all[0.0067 s])"
-    assert str(SLIP_FEATURES[-1]) == "relative(ratio_gain[0.107 s])"
 
 
 def test_the_list_for_any_hand():

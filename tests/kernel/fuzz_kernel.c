@@ -122,10 +122,8 @@ static void make_sizes(input *in, holdfast_hand *hand)
     hand->tare_kind = (int32_t)(take(in, 1) % 4);
     hand->tare_seconds = (hf_real)0.05;
     hand->noise_seconds = (hf_real)0.05;
-    hand->average_gain = (hf_real)0.2;
     hand->alike = take(in, 1) % 2;
     hand->has_centres = take(in, 1) % 2;
-    hand->has_ratios = take(in, 1) % 2;
     hand->zero_unknown = take(in, 1) % 2;
 }
 
@@ -293,9 +291,6 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         lags[i].samples = (size_t)take(&in, 1) % 40;
         lags[i].seconds = (double)lags[i].samples * (double)hand.period;
         lags[i].has_changes = take(&in, 1) % 2;
-        lags[i].has_seconds = take(&in, 1) % 2;
-        lags[i].has_means = take(&in, 1) % 2;
-        lags[i].has_ratios = take(&in, 1) % 2;
         lags[i].sliding = hand.n_slides ? take(&in, 8) : 0;
     }
     for (size_t i = 0; i < n_features && hand.n_history > 0; ++i) {

@@ -4,7 +4,7 @@ import numpy as np
 
 from holdfast.detection import Tare
 from holdfast.detection.plan import Start, StreamPlan
-from holdfast.detection.specs import KINDS, RELATIVE_KINDS, FeatureSpec, kinds_of
+from holdfast.detection.specs import KINDS, RELATIVE_KINDS, FeatureSpec
 from holdfast.sensors import Sensor
 
 RATES = (20.0, 60.0, 150.0, 500.0, 1000.0)
@@ -35,11 +35,10 @@ def random_features(rng, n_taxels):
     relative, force = rng.random() < 0.6, rng.random() < 0.7
     seconds = rng.choice([0.004, 0.02, 0.1, 0.3], size=2, replace=False)
     for kind in RELATIVE_KINDS if relative else ():
-        is_second = kind in kinds_of("second", "mean_second")
         if KINDS[kind].min_taxels > n_taxels or rng.random() < 0.4:
             continue
         scope = "hand" if rng.random() < 0.2 else "finger"
-        lag = float(seconds[0] if is_second else rng.choice(seconds))
+        lag = float(rng.choice(seconds))
         specs.append(FeatureSpec(kind, transform="relative", scope=scope, seconds=lag))
     for kind in ("F_a", "F_x", "m", "sigma", "sigma_xyz", "change") if force or not specs else ():
         window = int(rng.choice([2, 4, 6, 14, 30, 64])) if KINDS[kind].window == "window" else 0

@@ -91,7 +91,7 @@ class TestTrain:
         assert part.slip.features == expected
         assert len(part.slip.rule.squares[0]) == len(expected)
         (text,) = [text for text in warnings if "taxel" in text]
-        assert text.startswith("second_shared, second_own, second_top, mean_second_shared")
+        assert text.startswith("centre_shift, divergence, relative_divergence, fast_own")
         assert trained[0].cross_validation.slips.pooled.incipient["0.1"] > 50
 
     def test_the_speed_is_that_of_the_truth(self, trained):

@@ -37,8 +37,6 @@ SUM_OF_WEIGHTS = 1.0 + float(np.sqrt(2.0)) / 1.5 + float(np.sqrt(3.0)) / 1.6
 MAX_EARTH_FIELDS = {"anyskin": 130.0}
 """Twice the field of the earth, by sensors whose readings are in microtesla: it is at most 65 µT,
 and changes by twice that when a hand is turned over [µT]."""
-AVERAGE_SECONDS = 0.02
-"""Time constant of averages of squared second differences [s]."""
 RING_SPARE = 2
 """Samples that the history of relative features holds, as a multiple of those of its longest lag:
 for bursts, and for a rate that rises."""
@@ -150,10 +148,8 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
         "noise_seconds": noise_seconds,
-        "average_gain": -float(np.expm1(-1.0 / (plan.rate * AVERAGE_SECONDS))),
         "alike": len({tuple(own) for own in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
-        "has_ratios": any(lag["has_ratios"] for lag in lags),
         "zero_unknown": plan.zero_unknown,
     }
 
@@ -222,9 +218,6 @@ def _lag(seconds: float, rate: float, specs: Sequence[FeatureSpec]) -> Row:
         "samples": max(1, round(seconds * rate)),
         "seconds": seconds,
         "has_changes": not families.isdisjoint(("change", "load")),
-        "has_seconds": not families.isdisjoint(("second", "mean_second")),
-        "has_means": "mean_second" in families,
-        "has_ratios": "ratio" in families,
         "sliding": sum(1 << i for i, kind in enumerate(kinds_of("sliding")) if kind in kinds),
     }
 

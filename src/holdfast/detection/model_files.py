@@ -19,8 +19,8 @@ ModelT = TypeVar("ModelT", bound=msgspec.Struct)
 MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
-ONNX_RULE = re.compile(rb'"type"\s*:\s*"onnx"')
-"""What a model file has where the rule of a head is an ONNX file."""
+PARTS = re.compile(rb'"(type|kind)"\s*:\s*"(\w+)"')
+"""What a model file has where it names the rule of a head, or a feature."""
 
 
 def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
@@ -45,9 +45,10 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
             data = msgspec.json.encode(found)
         return decode(data, kind)
     except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
-        if ONNX_RULE.search(data):
-            text = removal("rules", "onnx", "the ONNX classifier of this model")
-            raise ModelError(f"{path}: {text}") from cause
+        for key, name in ((key, name.decode()) for key, name in PARTS.findall(data)):
+            part = "rule" if key == b"type" else "feature"
+            if text := removal(f"{part}s", name, f"the {part} {name} of this model"):
+                raise ModelError(f"{path}: {text}") from cause
         raise ModelError(f"{path} is not a model of {MODEL_SCHEMA}: {cause}") from cause
 
 

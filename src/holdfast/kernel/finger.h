@@ -185,7 +185,6 @@ typedef struct {
     hf_real force[3];         /* F_tip */
     hf_real normal;           /* sum of the normal readings: z in the taxel frames */
     hf_real weight;           /* sum p_i */
-    hf_real pressure_squares; /* sum p_i^2 */
     hf_real squares;          /* sum |h_i|^2 */
     hf_real moved;            /* sum of the squared steps of the taxels */
 } hf_taxel_sums;
@@ -205,15 +204,6 @@ typedef struct {
     hf_real oldest; /* weight c; 1 at even times */
 } hf_second;
 
-/* Sums over the second differences d_i of the taxels. */
-typedef struct {
-    hf_real squares;     /* sum |d_i|^2 */
-    hf_real shared;      /* sum p_i |d_i|^2 */
-    hf_real along;       /* sum p_i (d_i . n)^2 */
-    hf_real weighted[3]; /* sum p_i d_i */
-    hf_real top;         /* largest |d_i|^2 of the taxels with p_i > mean p; 0 without any */
-} hf_second_sums;
-
 /* Sums over the normal parts p_i = g_i . n of the taxels. */
 typedef struct {
     hf_real risen;         /* sum max(p_i, 0) */
@@ -228,7 +218,6 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
 HF_SHARED hf_real hf_moment(const hf_finger *f, size_t now, hf_real centre[3]);
 HF_SHARED hf_residual
 hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3]);
-HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at);
 HF_SHARED hf_normal_sums hf_sum_normals(const hf_finger *f, size_t now);
 
 /* Mean and spread of a window. */

@@ -187,7 +187,7 @@ enum {
     HOLDFAST_CHANGE = 7,    /* |F_tip(k) - F_tip(k - N_w + 1)| */
     /* ... and relative ones, over a lag (motion.c, sliding.c). */
     HOLDFAST_FIRST_RELATIVE = 8,
-    HOLDFAST_N_RELATIVE = 56
+    HOLDFAST_N_RELATIVE = 43
 };
 
 /* Relative features: HOLDFAST_FIRST_RELATIVE plus one of these. */
@@ -199,42 +199,33 @@ enum {
     HF_PRESSURE_SHIFT = 4,
     HF_MOMENT_CHANGE = 5,
     HF_LOAD_TO_NOISE = 6,
-    /* Five second differences of the taxels, see hf_fill_seconds: of all; weighted by pressure; the
-     * part of that across the normal; without the motion that all share; of the pressed taxel that
-     * has the largest. Then the same, averaged. */
-    HF_SECOND = 7,
-    HF_MEAN_SECOND = 12,
-    HF_SHEAR_GAIN = 17,
-    HF_NORMAL_GAIN = 18,
-    HF_RATIO_GAIN = 19,
     /* Those of sliding (sliding.c): of the newest sample, ... */
-    HF_FIRST_SLIDING = 20,
-    HF_FRICTION = 20,
-    HF_TAXEL_FRICTION = 21,
-    HF_FORCE_TO_NOISE = 22,
-    HF_FRICTION_MARGIN = 23,
+    HF_FIRST_SLIDING = 7,
+    HF_FRICTION = 7,
+    HF_TAXEL_FRICTION = 8,
+    HF_FORCE_TO_NOISE = 9,
+    HF_FRICTION_MARGIN = 10,
     /* ... changes of the force and of what is computed from it, ... */
-    HF_SHEAR_BY_LOAD = 24,
-    HF_NORMAL_BY_LOAD = 25,
-    HF_FORCE_BY_LOAD = 26,
-    HF_FRICTION_RISE = 27,
-    HF_TAXEL_FRICTION_RISE = 28,
-    HF_ALIGNMENT = 29,
-    HF_CENTRE_SHIFT = 30,
+    HF_SHEAR_BY_LOAD = 11,
+    HF_NORMAL_BY_LOAD = 12,
+    HF_FORCE_BY_LOAD = 13,
+    HF_FRICTION_RISE = 14,
+    HF_TAXEL_FRICTION_RISE = 15,
+    HF_ALIGNMENT = 16,
+    HF_CENTRE_SHIFT = 17,
     /* ... of the taxels, ... */
-    HF_DIVERGENCE = 31,
-    HF_RELATIVE_DIVERGENCE = 32,
-    HF_NORMAL_DIVERGENCE = 33,
-    HF_FALLING_SHARE = 34,
-    HF_RISING_SHARE = 35,
+    HF_DIVERGENCE = 18,
+    HF_RELATIVE_DIVERGENCE = 19,
+    HF_NORMAL_DIVERGENCE = 20,
+    HF_FALLING_SHARE = 21,
+    HF_RISING_SHARE = 22,
     /* ... and five energies of fast changes: at once, and over 30, 100 and 400 ms. */
-    HF_FAST = 36
+    HF_FAST = 23
 };
 enum {
-    HF_N_SECONDS = 5,
     HF_N_ENERGIES = 5,
     HF_N_ENERGY_TIMES = 3,
-    HF_N_AVERAGES = 20,       /* of a lag: of second differences, then of energies */
+    HF_N_AVERAGES = 15,       /* of energies at a lag */
     HF_N_FRICTION_BLOCKS = 32 /* blocks of time of which the largest friction is kept */
 };
 
@@ -330,9 +321,6 @@ typedef struct {
     size_t samples; /* at even times */
     double seconds;
     bool has_changes; /* some feature needs HF_FORCE_CHANGE to HF_LOAD_TO_NOISE at this lag */
-    bool has_seconds; /* some feature needs second differences, or their averages */
-    bool has_means;   /* their averages */
-    bool has_ratios;  /* HF_SHEAR_GAIN to HF_RATIO_GAIN */
     uint64_t sliding; /* bit i: some feature needs HF_FIRST_SLIDING + i */
 } holdfast_lag;
 
@@ -352,10 +340,8 @@ typedef struct {
     int32_t tare_kind;
     hf_real tare_seconds;
     hf_real noise_seconds; /* time over which the noise is measured */
-    hf_real average_gain;  /* share of a new sample in averages of second differences */
     bool alike;            /* all fingers have the same features */
     bool has_centres;      /* some lag has changes: centre of pressure and moment are needed */
-    bool has_ratios;       /* some lag has ratios */
     bool zero_unknown;     /* the first samples are load, and no readings without are known */
     const holdfast_finger *fingers;   /* (n_fingers) */
     const holdfast_feature *features; /* (n_fingers, n_features) */

@@ -75,7 +75,6 @@ typedef struct {
     hf_real force[3];    /* F_tip */
     hf_real pressure[3]; /* centre of pressure, in radii of the patch */
     hf_real moment;      /* about the normal, divided by the radius */
-    hf_real ratio;       /* of tangential to normal force, beyond the reference */
     /* With features of sliding (sliding.c): */
     hf_real amplitude;       /* |F_tip| */
     hf_real centre[3];       /* centre of pressure in the taxels' own frames, in radii */
@@ -102,10 +101,6 @@ typedef struct {
     double block_start;        /* [s]; NaN before the first sample */
     double moved_at;           /* when the force last moved by much more than its noise [s] */
     hf_real moved_by;          /* change of the force over HF_MOVE_SECONDS */
-    hf_real pressure;          /* sum of |h_i . n| over the taxels */
-    hf_real pressure_squares;  /* sum of their squares */
-    hf_real normal_floor;      /* |normal force| beyond the reference and 10 times its noise */
-    hf_real tangent[3];        /* direction of the tangential force */
     hf_real contact_zero[3];   /* F_tip without contact: of the tare, or of a release since */
     int32_t poles;             /* whether the normal readings have opposite signs in a touch */
     hf_real contact_load;      /* force beyond contact_zero, or of the taxels */

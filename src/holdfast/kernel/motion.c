@@ -28,14 +28,6 @@
 #define HF_NOISE_SQUARES ((hf_real)4)
 /* A change by less than this share of the load counts as none. */
 #define HF_LEAST_CHANGE ((hf_real)0.005)
-/* Squared noise of a second difference, of three samples: 1 + 4 + 1 times that of a sample. */
-#define HF_SECOND_NOISE ((hf_real)6)
-/* Squared second difference that counts as none, in squared noise: a quarter of its noise. */
-#define HF_SECOND_FLOOR (HF_SECOND_NOISE / 16)
-/* Time constant of averages of squared second differences [s]. */
-#define HF_AVERAGE_SECONDS ((hf_real)0.02)
-/* Noise in the denominator of the ratio of forces: a light touch has no large ratio. */
-#define HF_NORMAL_NOISE_WEIGHT ((hf_real)10)
 
 /* Return the index in the ring that lies `back` samples, at most all, before another. */
 static inline size_t hf_index_before(const hf_finger *f, size_t now, size_t back)
@@ -110,8 +102,6 @@ HF_SHARED hf_real hf_append_taxels(const hf_finger *f, double time, hf_real forc
         track->force[axis] = force[axis] = sums.force[axis];
         track->pressure[axis] = centre[axis] / weight;
     }
-    m->pressure = weight;
-    m->pressure_squares = sums.pressure_squares;
     m->taxel_load = hf_sqrt(sums.squares);
     /* Sums over the block: squares of steps of F and of all g_i. Repeated samples do not count, nor
      * steps over a gap that is bridged, in which the force may change; nor samples whose noise went
@@ -254,27 +244,6 @@ static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, 
     }
 }
 
-/* Update the tangent, and the ratio of tangential to normal force. */
-static void hf_update_ratio(const hf_finger *f, size_t now)
-{
-    holdfast_motion *const m = &f->state->motion;
-    /* With F beyond the reference: F_t = F - (F . n) n, N = |F . n| + 10 noise, r = |F_t| / N,
-     * t = F_t / |F_t|. */
-    hf_real tangential[3];
-    hf_beyond(f->track[now].force, m->reference, tangential);
-    const hf_real normal = hf_dot(tangential, f->finger->normal);
-    for (size_t axis = 0; axis < 3; ++axis) {
-        tangential[axis] -= normal * f->finger->normal[axis];
-    }
-    const hf_real size = hf_sqrt(hf_square(tangential));
-    const hf_real share = 1 / hf_max(size, HF_TINY);
-    m->normal_floor = hf_abs(normal) + HF_NORMAL_NOISE_WEIGHT * m->noise;
-    f->track[now].ratio = size / m->normal_floor;
-    for (size_t axis = 0; axis < 3; ++axis) {
-        m->tangent[axis] = share * tangential[axis];
-    }
-}
-
 /* Return what changes of the force of a finger are divided by. */
 static hf_real hf_load_floor(const holdfast_motion *m)
 {
@@ -319,19 +288,6 @@ static void hf_fill_changes(
     out[HF_LOAD_TO_NOISE] = load_to_noise;
 }
 
-/* Fill the changes of tangential and normal force, and of their ratio, over one lag. */
-static void hf_fill_ratios(const hf_finger *f, size_t now, size_t then, hf_real *out)
-{
-    /* dF . t / N, dF . n / N and r(k) - r(k-l). */
-    const holdfast_motion *const m = &f->state->motion;
-    const hf_real scale = 1 / m->normal_floor;
-    hf_real change[3];
-    hf_force_between(f, then, now, change);
-    out[HF_SHEAR_GAIN] = scale * hf_dot(change, m->tangent);
-    out[HF_NORMAL_GAIN] = scale * hf_dot(change, f->finger->normal);
-    out[HF_RATIO_GAIN] = f->track[now].ratio - f->track[then].ratio;
-}
-
 /* Return the three samples of a second difference.
  *
  * The third lies as long before the second as the second before the newest. A gap, or uneven times,
@@ -363,45 +319,6 @@ static hf_second hf_second_of(const hf_finger *f, size_t now, size_t back, size_
     return second;
 }
 
-/* Return log v of a second difference, given v^2 in squared noise, beyond that of noise. */
-static hf_real hf_beyond_noise(hf_real square)
-{
-    /* log sqrt(max(v^2 - 6, 0) + 6 / 16). */
-    return hf_log(hf_max(square - HF_SECOND_NOISE, 0) + HF_SECOND_FLOOR) / 2;
-}
-
-/* Fill the second differences of the taxels at one spacing, and their averages where `averages` is
- * not NULL; `gain` is the share of a new sample in these. */
-static void hf_fill_seconds(
-    const hf_finger *f, hf_second at, hf_real gain, hf_real *averages, hf_real *out)
-{
-    const holdfast_motion *const m = &f->state->motion;
-    const hf_real n_used = f->finger->n_used, share = 1 / m->pressure;
-    const hf_second_sums s = hf_second_differences(f, at);
-    /* With w_i = p_i / sum p and D = sum d_i:
-     * sum |d_i - w_i D|^2 = sum |d_i|^2 - 2 D . sum w_i d_i + |D|^2 sum w_i^2. */
-    hf_real all[3];
-    for (size_t axis = 0; axis < 3; ++axis) {
-        all[axis] = at.newest * f->track[at.now].force[axis] - 2 * f->track[at.before].force[axis] +
-                    at.oldest * f->track[at.first].force[axis];
-    }
-    const hf_real common = hf_square(all) * (m->pressure_squares * share) * share;
-    const hf_real own = s.squares - 2 * hf_dot(all, s.weighted) * share + common;
-    const hf_real shear = n_used * (s.shared - s.along) * share;
-    const hf_real sums[HF_N_SECONDS] = {
-        s.squares, n_used * s.shared * share, hf_max(shear, 0), hf_max(own, 0), n_used * s.top};
-    const hf_real noise_share = 1 / (m->taxel_noise * m->taxel_noise);
-    for (size_t i = 0; i < HF_N_SECONDS; ++i) {
-        out[HF_SECOND + i] = hf_beyond_noise(sums[i] * noise_share);
-        if (averages) {
-            /* a(k) = a(k-1) + gain (v(k)^2 - a(k-1)). */
-            averages[i] = isnan(averages[i]) ? sums[i] : averages[i];
-            averages[i] += gain * (sums[i] - averages[i]);
-            out[HF_MEAN_SECOND + i] = hf_beyond_noise(averages[i] * noise_share);
-        }
-    }
-}
-
 /* Compute the relative features of a finger, after `hf_append_taxels`. */
 HF_SHARED void hf_update_motion(const hf_finger *f, double time)
 {
@@ -416,9 +333,6 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     hf_update_load(f, now, keep);
     hf_update_contact_load(f, now, keep);
     hf_update_movement(f, now, n_before, time);
-    if (hand->has_ratios) {
-        hf_update_ratio(f, now);
-    }
     if (HF_N_SLIDES(hand) > 0) {
         hf_append_slide(f, now, time, step);
     }
@@ -426,11 +340,6 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
         hf_fill(f->relative, HF_N_LAGS(hand) * HOLDFAST_N_RELATIVE, HF_NAN);
         hf_fill(f->averages, HF_N_LAGS(hand) * HF_N_AVERAGES, HF_NAN);
         return;
-    }
-    hf_real gain = hand->average_gain;
-    if (hf_abs(step - hand->period) > HF_EVEN_STEPS * hand->period) {
-        const hf_real longest = HF_GAP_LIMIT_PERIODS * hand->period;
-        gain = -hf_expm1(-hf_min(step, longest) / HF_AVERAGE_SECONDS);
     }
     /* log(L / noise): the same for all lags. */
     const holdfast_motion *const m = &f->state->motion;
@@ -443,22 +352,12 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
         if (lag->has_changes) {
             hf_fill_changes(f, now, then, load_to_noise, out);
         }
-        if (lag->has_ratios) {
-            hf_fill_ratios(f, now, then, out);
-        }
         if (lag->sliding) {
             hf_fill_slide(f, lag, now, then, out);
         }
-        const bool has_energies = lag->sliding >> (HF_FAST - HF_FIRST_SLIDING) != 0;
-        if (lag->has_seconds || has_energies) {
-            const hf_second second = hf_second_of(f, now, back, n_before);
-            hf_real *const averages = f->averages + i * HF_N_AVERAGES;
-            if (lag->has_seconds) {
-                hf_fill_seconds(f, second, gain, lag->has_means ? averages : NULL, out);
-            }
-            if (has_energies) {
-                hf_fill_energies(f, lag->sliding, second, step, averages + HF_N_SECONDS, out);
-            }
+        if (lag->sliding >> (HF_FAST - HF_FIRST_SLIDING) != 0) {
+            const hf_second at = hf_second_of(f, now, back, n_before);
+            hf_fill_energies(f, lag->sliding, at, step, f->averages + i * HF_N_AVERAGES, out);
         }
     }
 }

@@ -67,9 +67,8 @@ static const char *hf_check_numbers(const holdfast_hand *hand)
     if (hand->tare_kind < HOLDFAST_TARE_SECONDS || hand->tare_kind > HOLDFAST_TARE_INTERVAL) {
         return "tare_kind";
     }
-    if (!isfinite(hand->tare_seconds) || !isfinite(hand->noise_seconds) ||
-        !isfinite(hand->average_gain)) {
-        return "tare_seconds, noise_seconds or average_gain";
+    if (!isfinite(hand->tare_seconds) || !isfinite(hand->noise_seconds)) {
+        return "tare_seconds or noise_seconds";
     }
     for (size_t i = 0; i < hand->n_lags; ++i) {
         if (!isfinite(hand->lags[i].seconds) || hand->lags[i].samples > HF_MAX_SAMPLES ||

@@ -55,10 +55,10 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
     const size_t n = f->n;
     hf_real *const ring = hf_forces_at(f, now);
     const hf_real *const then = hf_forces_at(f, before);
-    hf_sum fx, fy, fz, normal, weight, pressure_squares, squares, moved;
+    hf_sum fx, fy, fz, normal, weight, squares, moved;
     for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
         hf_wide x = {0}, y = {0}, z = {0}, readings_z = {0};
-        hf_wide p = {0}, pp = {0}, hh = {0}, steps = {0};
+        hf_wide p = {0}, hh = {0}, steps = {0};
         for (size_t i = lane; i < n; i += HF_LANES) {
             const hf_vectors reading =
                 hf_minus(hf_load_vectors(f->readings, n, i), hf_load_vectors(f->baseline, n, i));
@@ -75,7 +75,6 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
             z += g.z;
             readings_z += reading.z;
             p += pressed;
-            pp += pressed * pressed;
             hh += hf_squares(h);
         }
         hf_put(&fx, lane, x);
@@ -83,7 +82,6 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
         hf_put(&fz, lane, z);
         hf_put(&normal, lane, readings_z);
         hf_put(&weight, lane, p);
-        hf_put(&pressure_squares, lane, pp);
         hf_put(&squares, lane, hh);
         hf_put(&moved, lane, steps);
     }
@@ -91,7 +89,6 @@ HF_SHARED hf_taxel_sums hf_turn_taxels(const hf_finger *f, size_t now, size_t be
         {hf_total(fx), hf_total(fy), hf_total(fz)},
         hf_total(normal),
         hf_total(weight),
-        hf_total(pressure_squares),
         hf_total(squares),
         hf_total(moved)};
     return sums;
@@ -151,51 +148,6 @@ hf_residual_of(const hf_finger *f, size_t now, size_t then, const hf_real mean[3
         hf_put(&pressed, lane, along);
     }
     const hf_residual sums = {hf_total(moved), hf_total(pressed)};
-    return sums;
-}
-
-HF_SHARED hf_second_sums hf_second_differences(const hf_finger *f, hf_second at)
-{
-    const size_t n = f->n;
-    const hf_real *const ring = hf_forces_at(f, at.now), *const mid = hf_forces_at(f, at.before);
-    const hf_real *const old = hf_forces_at(f, at.first);
-    const hf_real a = at.newest, c = at.oldest;
-    const hf_real mean = f->state->motion.pressure / f->finger->n_used;
-    hf_sum squares, shared, along, px, py, pz, top;
-    for (size_t lane = 0; lane < HF_LANES; lane += HF_WIDTH) {
-        hf_wide dd = {0}, pdd = {0}, pushes = {0}, x = {0}, y = {0}, z = {0}, most = {0};
-        const hf_wide none = {0};
-        for (size_t i = lane; i < n; i += HF_LANES) {
-            const hf_vectors g = hf_load_vectors(ring, n, i), m = hf_load_vectors(mid, n, i);
-            const hf_vectors o = hf_load_vectors(old, n, i);
-            const hf_vectors d = {
-                a * g.x - 2 * m.x + c * o.x, a * g.y - 2 * m.y + c * o.y,
-                a * g.z - 2 * m.z + c * o.z};
-            const hf_wide p = hf_load(f->pressed + i), square = hf_squares(d);
-            const hf_wide pushed = hf_along(d, f->finger->normal);
-            const hf_wide rival = hf_where(p > mean, square, none);
-            dd += square;
-            pdd += p * square;
-            pushes += p * (pushed * pushed);
-            x += p * d.x;
-            y += p * d.y;
-            z += p * d.z;
-            most = hf_greater(rival, most);
-        }
-        hf_put(&squares, lane, dd);
-        hf_put(&shared, lane, pdd);
-        hf_put(&along, lane, pushes);
-        hf_put(&px, lane, x);
-        hf_put(&py, lane, y);
-        hf_put(&pz, lane, z);
-        hf_put(&top, lane, most);
-    }
-    const hf_second_sums sums = {
-        hf_total(squares),
-        hf_total(shared),
-        hf_total(along),
-        {hf_total(px), hf_total(py), hf_total(pz)},
-        hf_largest_lane(top)};
     return sums;
 }
 

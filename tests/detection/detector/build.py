@@ -73,8 +73,7 @@ SLIP_OWN = (
 )
 """Features of a head of slips; the second is one of the head of stability, too."""
 TAXELS = tuple(
-    FeatureSpec(kind, transform="relative", seconds=0.02)
-    for kind in kinds_of("second", "mean_second", "ratio", "sliding")
+    FeatureSpec(kind, transform="relative", seconds=0.02) for kind in kinds_of("sliding")
 )
 """Features of a head of slips that need the taxels."""
 
