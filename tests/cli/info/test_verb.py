@@ -160,7 +160,7 @@ class TestModel:
     def test_json_has_the_heads_with_their_choice(self, capsys):
         heads = info_json(capsys, "builtin:twin")["fingers"]["*"]["heads"]
         assert list(heads) == ["stable", "slip", "slip_speed", "cause"]
-        assert [len(head["features"]) for head in heads.values()] == [15, 39, 39, 15]
+        assert [len(head["features"]) for head in heads.values()] == [15, 132, 132, 15]
         assert heads["slip"]["choice"]["n"] > 0
         assert heads["stable"]["choice"] is None
         assert "threshold" not in heads["slip_speed"] and "threshold" not in heads["cause"]
