@@ -36,13 +36,13 @@ TASKS: dict[str, list[str]] = {
     "first look": ["holdfast --help", "holdfast doctor"],
     "demo": ["holdfast demo"],
     "own CSV file": [
-        "holdfast detect builtin:any press.csv", PASTE + " --plot states.png",
+        "holdfast detect builtin:any press.csv", PASTE + " --summary --plot states.png",
     ],
     "own npz file": ["holdfast import press.npz recordings", PASTE, "holdfast info recordings"],
     "own bag": [
         "holdfast import press-bag bags",
         "holdfast import press-bag bags --topic /thumb/tactile=uskin-curved",
-        "holdfast detect builtin:any bags/press-bag.parquet",
+        "holdfast detect builtin:any bags/press-bag.parquet --summary",
     ],
     "array in Python": ["python array_of_readings.py"],
     "hand": [
