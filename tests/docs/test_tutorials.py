@@ -133,7 +133,7 @@ def hand_lines():
                     yield re.sub(r'"?xela://auto\S*', "twin:", line)
 
 
-@pytest.mark.parametrize("line", hand_lines(), ids=lambda line: line.split()[1])
+@pytest.mark.parametrize("line", list(hand_lines()), ids=lambda line: line.split()[1])
 def test_a_line_for_a_hand_runs_with_the_twin(folder, line):
     """Without the model that `calibrate` would have written, `builtin:any` is detected with."""
     end, until = LIMITS[line.split()[1]]
