@@ -51,8 +51,11 @@ def main() -> None:
     """Write the picture, then the film."""
     folder = Path(sys.argv[1]) if len(sys.argv) > 1 else OUT
     with opened(*PICTURE, size=VIEW) as page:
-        page.wait_for_function(MIXED, timeout=180_000)
-        page.screenshot(path=folder / "live.png")
+        is_mixed = False
+        while not is_mixed:  # also once the picture is taken
+            page.wait_for_function(MIXED, timeout=180_000)
+            page.screenshot(path=folder / "live.png")
+            is_mixed = page.evaluate(MIXED)
     out = folder / "live.webp"
     with opened(*FILM, size=VIEW) as page:
         page.wait_for_function("() => /starts again/.test(document.body.innerText)", timeout=60_000)

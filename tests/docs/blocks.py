@@ -139,7 +139,7 @@ def run_block(block: Block, names: dict[str, object]) -> bool:
         return False
     if block.language == "sh":
         for line in lines_of(block.text):
-            run_line(line, block, endless=kind == "until Ctrl-C")
+            run_line(line, block, until="Ctrl-C stops it" if kind == "until Ctrl-C" else None)
     elif block.language == "python" and ">>>" not in block.text:
         exec(compile("\n" * block.line + block.text, block.page, "exec"), names)
     else:
@@ -155,10 +155,10 @@ def lines_of(text: str) -> Iterator[str]:
             yield command
 
 
-def run_line(line: str, block: Block, *, endless: bool) -> None:
+def run_line(line: str, block: Block, *, until: str | None) -> None:
     words = shlex.split(line)
-    if endless:
-        interrupt(line, block)
+    if until is not None:
+        interrupt(line, block, until)
     elif words[0] == "holdfast" and not SHELL_SYMBOLS.search(line):
         code = main(words[1:])
         assert code == 0, f"{block.location}: {line!r} ended with {code}"
@@ -171,8 +171,8 @@ def run_line(line: str, block: Block, *, endless: bool) -> None:
         assert done.returncode == 0, f"{block.location}: {line!r}: {done.stderr}"
 
 
-def interrupt(line: str, block: Block) -> None:
-    """Run a command until it says what stops it, then interrupt it as Ctrl-C does.
+def interrupt(line: str, block: Block, until: str) -> None:
+    """Run a command until it prints a text, then interrupt it as Ctrl-C does.
 
     An earlier interrupt could come while modules are imported, and be lost there.
     """
@@ -184,7 +184,7 @@ def interrupt(line: str, block: Block) -> None:
         first = ""
         for line_of_it in process.stderr:
             first += line_of_it
-            if "Ctrl-C stops it" in line_of_it:
+            if until in line_of_it:
                 break
         os.killpg(process.pid, signal.SIGINT)
         _, rest = process.communicate(timeout=PATIENCE)

@@ -111,3 +111,31 @@ def test_the_links_exist(page):
         assert path.exists(), target
         if anchor and path.suffix == ".md":
             assert anchor in blocks.anchors_of(path), f"{target}#{anchor}"
+
+
+FIRST_DAY = DOCS / "tutorials" / "your-hand.md"
+LIMITS = {
+    "doctor": ("--seconds 2", None),
+    "serve": ("--port 0 --no-browser", "Ctrl-C stops it"),
+    "calibrate": ("--seconds 12 --speed 0 --force", None),
+    "detect": ("", "Ctrl-C stops"),
+    "teach": ("2> log < <(printf 'next\\nquit\\n') || grep 'recordings go to' log", None),
+}
+"""What keeps the line of each verb short, and the text at which one that goes on is interrupted."""
+
+
+def hand_lines():
+    """The lines of the five steps that have the address of a hand, with `twin:` in its place."""
+    for block in blocks.blocks_of(FIRST_DAY):
+        if block.section[:1].isdigit():
+            for line in blocks.lines_of(block.text):
+                if "xela://auto" in line:
+                    yield re.sub(r'"?xela://auto\S*', "twin:", line)
+
+
+@pytest.mark.parametrize("line", list(hand_lines()), ids=lambda line: line.split()[1])
+def test_a_line_for_a_hand_runs_with_the_twin(folder, line):
+    """Without the model that `calibrate` would have written, `builtin:any` is detected with."""
+    end, until = LIMITS[line.split()[1]]
+    line = f"{line.replace('detect mine.json', 'detect builtin:any')} {end}"
+    blocks.run_line(line, blocks.Block(FIRST_DAY.name, 0, "sh", line, "", ""), until=until)

@@ -185,10 +185,9 @@ def unstable_since(summary: Mapping[str, Any], label: "Label") -> float:
     """Return since when the hand is UNSTABLE as a label begins, or becomes so after it [s]."""
     events = [x for x in summary["events"] if x["finger"] == "hand"]
     ends = [*(x["time"] for x in events[1:]), inf]
-    return next(
-        x["time"]
-        for x, end in zip(events, ends, strict=True)
-        if x["state"] == "UNSTABLE" and end > label.start
+    spans = zip(events, ends, strict=True)
+    return float(
+        next(x["time"] for x, end in spans if x["state"] == "UNSTABLE" and end > label.start)
     )
 
 

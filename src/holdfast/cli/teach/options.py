@@ -61,8 +61,6 @@ class GuideOptions:
         check_speed(source, speed)
         if is_twin(source):
             require_extras("twin", "parquet", "label", "video")
-            if self.camera:
-                raise ValueError("twin: has its own camera: leave out --camera")
         elif self.unattended:
             raise ValueError(
                 "--unattended is for twin:; a robot sends the lines next, repeat, skip or quit "
@@ -91,8 +89,12 @@ class GuideOptions:
         folder = TeachingFolder(path, resume=self.resume)
         if GuidedProtocol({}, folder.results, steps).stage is Stage.OVER:
             return folder  # only the fit was stopped
-        if self.camera:  # a wrong one is reported before somebody stands at the robot
-            CameraRecorder(self.camera, path / "camera.mp4").close()
+        camera = self.camera
+        if camera and is_twin(source):
+            print_message(f"twin: has a camera of its own, used in place of --camera {camera}")
+            camera = None
+        elif camera:  # a wrong one is reported before somebody stands at the robot
+            CameraRecorder(camera, path / "camera.mp4").close()
         with handle_stop_signals() as stop, ExitStack() as stack:
             keys = stack.enter_context(MarkerKeys(TEACH_KEYS))
             screen = TeachScreen(is_read=not self.unattended)
@@ -108,7 +110,7 @@ class GuideOptions:
                 stop.graceful = True
                 print_message(f"{opened.name}: recordings go to {path}")
                 guide = Guide(
-                    opened, model, folder, steps, camera=self.camera, unattended=self.unattended
+                    opened, model, folder, steps, camera=camera, unattended=self.unattended
                 )
                 guide.run(stop, keys, screen)
         return folder
