@@ -1,6 +1,6 @@
 """Draw what faulty and misled magnetic sensors cost, and print what is found in real recordings.
 
-    python benchmarks/faulty_sensors.py --out docs/img    # faulty-sensors.png, health.png
+    python benchmarks/faulty_sensors.py --out docs/img    # faulty-sensors.png
     python benchmarks/faulty_sensors.py --data DATA       # a table
     python benchmarks/faulty_sensors.py --laws FOLDER ... # laws of a living skin: two tables
 
@@ -26,10 +26,8 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detection import FingerTrace, Model, detect
 from holdfast.io import load_recording
 from holdfast.io.importers import import_recordings
-from holdfast.live.health import module_health
 from holdfast.live.module_checks import HoldDrift, ModuleComparison
 from holdfast.plots import COLOURS
-from holdfast.plots.sensors import plot_noise
 from holdfast.plots.style import (
     FONT_SIZE,
     STATE_COLOURS,
@@ -169,18 +167,6 @@ def save(figure: Figure, path: Path) -> None:
     file = io.BytesIO()
     figure.savefig(file, dpi=130, format="png")
     Image.open(file).quantize(64).save(path, optimize=True)  # a third of the size
-
-
-def draw_health(path: Path) -> None:
-    """Draw the noise of an open hand, one of whose taxels is loud, as `doctor --plot` does."""
-    noise = {}
-    for seed, name in enumerate(("thumb", "index")):
-        which, rng = sensor("uskin-curved"), np.random.default_rng(seed)
-        readings = 33_000 + rng.normal(0, 3, (1000, which.n_taxels, 3))
-        readings[:, 6] += rng.normal(0, 15 * seed, (1000, 3))
-        times = np.arange(1000) / RATE
-        noise[name] = module_health(name, which, times, np.rint(readings)).noise
-    save(plot_noise(noise), path)
 
 
 def draw(path: Path) -> None:
@@ -325,7 +311,6 @@ def main() -> None:
         print_broken(list(firsts), options.start)
     if options.out:
         draw(options.out / "faulty-sensors.png")
-        draw_health(options.out / "health.png")
     if options.data:
         print_table(options.data)
 

@@ -45,11 +45,17 @@ NEVER = np.full(12_000, UNSTABLE)
     [
         ((np.full(12_000, UNKNOWN),), "weak: at most 1.9 false alarms a minute, 100 % missed"),
         ((NEVER,), "weak: "),
-        ((ALWAYS,), "weak: at most 1.9 false alarms a minute, 100 % missed within 0.2 s, of 12 on"),
+        (
+            (ALWAYS,),
+            "weak: at most 1.9 false alarms a minute, 100 % missed within 0.2 s; onsets: 12",
+        ),
         ((with_false_alarms(100),), "weak: 60 false alarms a minute, 0 % missed"),
         ((LABELS, RIGHT, LABELS, 7), "good: at most 0.27 false alarms a minute, 0 % missed"),
         ((late(2), RIGHT, LABELS, 7), "usable: at most 0.27 false alarms a minute, 17 % missed"),
-        ((late(5),), "weak: at most 1.9 false alarms a minute, 42 % missed within 0.2 s, of 12"),
+        (
+            (late(5),),
+            "weak: at most 1.9 false alarms a minute, 42 % missed within 0.2 s; onsets: 12",
+        ),
         (
             (CALM, np.where(CALM == STABLE, 0.9, 0.1), CALM),
             "not enough data (0 of 20 onsets, 1.1 of 10 held minutes, 1 of 5 recordings): at most",
@@ -89,7 +95,7 @@ ENOUGH = {"n_events": 20, "stable_minutes": 10.0}
 @pytest.mark.parametrize(
     ("fields", "start"),
     [
-        ({}, "good: at most 0.3 false alarms a minute, 0 % missed within 0.2 s, of 20 onsets in"),
+        ({}, "good: at most 0.3 false alarms a minute, 0 % missed within 0.2 s; onsets: 20, held"),
         ({"n_events": 12}, "not enough data (12 of 20 onsets): at most 0.3 false alarms"),
         ({"stable_minutes": 9.99}, "not enough data (9.9 of 10 held minutes): at most 0.3 false"),
         ({"n_recordings": 4}, "not enough data (4 of 5 recordings): at most 0.3 false"),
@@ -147,8 +153,8 @@ def slip_sentence(*arguments, **intervals):
 @pytest.mark.parametrize(
     ("pooled", "intervals", "line"),
     [
-        (slips(), {}, "good: 1 false alarms a minute, 5 % missed before 1 mm, of 40 slips over 1 "
-         "mm in 10 held minutes."),
+        (slips(), {}, "good: 1 false alarms a minute, 5 % missed before 1 mm; slips over 1 mm: "
+         "40, held minutes: 10."),
         (slips(found=90.0, rate=1.5), {}, "good: "),
         (slips(rate=1.6), {}, "usable: "),
         (slips(found=50.0, rate=3.0), {}, "usable: "),
@@ -160,7 +166,7 @@ def slip_sentence(*arguments, **intervals):
         (slips(minutes=9.0), {}, "not enough data (9 of 10 held minutes): "),
         (slips(n=0, rate=0.0), {}, "not enough data (0 of 20 slips over 1 mm): at most 0.3 false"),
         (slips(onsets="labels"), {}, "good (by labels): 1 false alarms a minute, 5 % missed within "
-         "0.1 s, of 40 slips in"),
+         "0.1 s; slips: 40, held"),
         (slips(n=19, onsets="labels"), {}, "not enough data (19 of 20 slips, by labels): "),
     ],
 )  # fmt: skip

@@ -167,8 +167,8 @@ def _line(
         word = fits[0] if fits else "weak"
     note = f" ({', '.join(notes)})" if notes else ""
     return (
-        f"{word}{note}: {alarms.text()} false alarms a minute, {missed.text()} % missed {how}, of "
-        f"{support.n_events} {support.what} in {_number(support.minutes)} held minutes."
+        f"{word}{note}: {alarms.text()} false alarms a minute, {missed.text()} % missed {how}; "
+        f"{support.what}: {support.n_events}, held minutes: {_number(support.minutes)}."
     )
 
 
