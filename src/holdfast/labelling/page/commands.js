@@ -1,10 +1,9 @@
 // Commands that keys and buttons run.
 
-import { callService } from "../web/api.js";
-import { byId } from "../web/dom.js";
-import { countOf } from "./format.js";
-import { keyBindings, listenToKeys } from "./keyboard.js";
-import { showToast } from "./status.js";
+import { callService } from "../web/connection.js";
+import { byId, showToast } from "../web/dom.js";
+import { listenToKeys } from "../web/help.js";
+import { CAUSES, causeKey, countOf, STATES } from "./format.js";
 
 const FORCES = ["F_a", "F_x", "F_y", "F_z", "xyz"];
 const READ_ONLY = "This recording is read-only";
@@ -12,22 +11,57 @@ const READ_ONLY = "This recording is read-only";
 export class Commands {
   constructor(page) {
     this.page = page;
-    page.plot.target = () => this.target();
-    for (const part of ["editor", "view", "plot", "player", "saver", "recordings"]) this[part] = page[part];
+    page.rows.target = () => this.target();
+    for (const part of ["editor", "view", "rows", "player", "saver", "recordings"]) this[part] = page[part];
   }
 
   listen() {
-    listenToKeys(keyBindings(this));
+    listenToKeys(this.keys());
     const on = (id, name, act) => byId(id).addEventListener(name, act);
     on("previous-recording", "click", () => this.openNeighbour(-1));
     on("next-recording", "click", () => this.openNeighbour(1));
-    on("force", "change", (event) => this.plot.showForce(event.target.value));
+    on("force", "change", (event) => this.rows.showForce(event.target.value));
     on("note", "input", (event) => this.editor.setNote(event.target.value));
-    on("help", "click", () => this.showHelp());
     on("propose", "click", () => this.propose());
     on("accept-all", "click", () => this.acceptAll());
     on("next-item", "click", () => this.nextReviewItem());
     on("toggle-side", "click", () => this.toggleSidePanel());
+  }
+
+  /** Return the keys of the page, for `listenToKeys`. */
+  keys() {
+    const states = Object.fromEntries(STATES.map((state, k) => [k + 1, () => this.setKind({ state })]));
+    const causes = Object.fromEntries(CAUSES.map((cause) => [causeKey(cause), () => this.setKind({ cause })]));
+    const closer = () => this.zoom(0.6), all = () => this.view.showAll();
+    return {
+      Label: [
+        ["1 2 3", "set the state: stable, unstable, no contact (of the selected label, or else of the next label)", states],
+        ["C D S L R K", "set the cause: closing, disturbance, slip, lost, released, glitch", causes],
+        ["drag", "draw a label on a finger; with Ctrl on all fingers"],
+        ["drag an edge", "move the edge; it snaps to change points, except with Alt"],
+        ["click", "select a label, and move the playback time"],
+        ["A", "copy the label to all fingers", { a: () => this.copy() }],
+        ["Delete", "delete the label", { Delete: () => this.remove(), Backspace: () => this.remove() }],
+        ["Esc", "cancel a drag, or clear the selection", { Escape: () => this.cancel() }],
+        ["Ctrl Z", "undo; with Shift redo", { "Control-z": () => this.undo(), "Control-Shift-z": () => this.redo(), "Control-y": () => this.redo() }],
+        ["E", "edit the note about the recording", { e: () => this.editNote(), "Control-s": () => this.saver.flush() }],
+        ["Enter", "accept the proposal under the pointer, or the next one; confirm a label of low confidence", { Enter: () => this.accept() }],
+        ["X", "reject the proposal", { x: () => this.reject() }],
+        ["Shift Enter", "accept all proposals of high confidence", { "Shift-Enter": () => this.acceptAll() }],
+        ["G", "go to the next item to review", { g: () => this.nextReviewItem() }],
+      ],
+      View: [
+        ["wheel", "zoom about the pointer"],
+        ["Shift or right drag", "move the time window"],
+        ["double click, 0", "show the whole recording", { 0: all, Home: all }],
+        ["+ − ← →", "zoom and move", { "+": closer, "=": closer, "-": () => this.zoom(1 / 0.6), ArrowLeft: () => this.pan(-0.2), ArrowRight: () => this.pan(0.2) }],
+        ["Space", "play or pause", { " ": () => this.player.toggle() }],
+        ["N P", "open the next or the previous recording", { n: () => this.openNeighbour(1), p: () => this.openNeighbour(-1) }],
+        ["F", "show |F|, Fx, Fy, Fz, or all three components", { f: () => this.nextForce() }],
+        ["Y", "fit the vertical axes to the whole recording or to the visible window", { y: () => this.toggleScaling() }],
+        ["B", "hide or show the side panel", { b: () => this.toggleSidePanel() }],
+      ],
+    };
   }
 
   setKind(fields) { this.editor.setKind(fields); }
@@ -45,7 +79,7 @@ export class Commands {
    * label of low confidence, else the item in focus, else the next proposal; null if none is left.
    */
   target() {
-    const { editor } = this, { hoveredProposal } = this.plot;
+    const { editor } = this, { hoveredProposal } = this.rows;
     if (hoveredProposal && editor.proposals.some(({ item }) => item === hoveredProposal.item)) {
       return { kind: "proposal", ...hoveredProposal };
     }
@@ -66,7 +100,7 @@ export class Commands {
     const target = this.target();
     if (!target) { showToast("No proposal is open", "good"); return; }
     if (this.editor.readOnly) { showToast(READ_ONLY, "bad"); return; }
-    const hovered = this.plot.hoveredProposal?.item === target.item;
+    const hovered = this.rows.hoveredProposal?.item === target.item;
     if (!this.view.contains(target.item) && !hovered) {
       this.view.reveal(target.item);
       this.editor.setFocus(target);
@@ -74,7 +108,7 @@ export class Commands {
     }
     const next = this.itemAfter(target);
     act(target);
-    this.plot.hoveredProposal = null;
+    this.rows.hoveredProposal = null;
     this.editor.setFocus(next);
     if (next && !hovered && !this.view.contains(next.item)) this.view.reveal(next.item);
   }
@@ -106,7 +140,7 @@ export class Commands {
   showReviewItem(reviewItem) {
     const { editor } = this, { kind, finger, item } = reviewItem;
     editor.lastReviewed = reviewItem;
-    this.plot.hoveredProposal = null;
+    this.rows.hoveredProposal = null;
     this.view.reveal(item);
     editor.select(finger, kind === "label" ? item : null);
     editor.setFocus(reviewItem);
@@ -149,27 +183,25 @@ export class Commands {
   }
 
   nextForce() {
-    const force = FORCES[(FORCES.indexOf(this.plot.force) + 1) % FORCES.length];
+    const force = FORCES[(FORCES.indexOf(this.rows.force) + 1) % FORCES.length];
     byId("force").value = force;
-    this.plot.showForce(force);
+    this.rows.showForce(force);
   }
 
   toggleScaling() {
-    this.plot.scaleToWindow = !this.plot.scaleToWindow;
-    this.plot.scales = null;
-    this.plot.redraw("signals");
-    showToast(this.plot.scaleToWindow ? "Vertical axes fit the visible window" : "Vertical axes fit the whole recording", "good");
+    this.rows.scaleToWindow = !this.rows.scaleToWindow;
+    this.rows.redraw("signals");
+    showToast(this.rows.scaleToWindow ? "Vertical axes fit the visible window" : "Vertical axes fit the whole recording", "good");
   }
 
   /** Zoom about the cursor, or about the middle of the window if there is no cursor. */
   zoom(factor) {
     const { start, end } = this.view;
-    this.view.zoom(factor, this.plot.hover?.time ?? (start + end) / 2);
+    this.view.zoom(factor, this.rows.hover?.time ?? (start + end) / 2);
   }
 
   pan(fraction) { this.view.pan(fraction * this.view.span); }
   toggleSidePanel() { byId("toggle-side").setAttribute("aria-pressed", String(document.body.classList.toggle("is-side-hidden"))); }
-  showHelp() { byId("help-box").showModal(); }
 
   editNote() {
     document.body.classList.remove("is-side-hidden");

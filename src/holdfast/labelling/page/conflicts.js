@@ -2,10 +2,9 @@
 // save them, or of another program that saved first. The labels that are not chosen stay in the
 // undo history.
 
-import { callService } from "../web/api.js";
-import { byId, make } from "../web/dom.js";
+import { callService } from "../web/connection.js";
+import { byId, make, makeButton, showToast } from "../web/dom.js";
 import { countOf, dateText } from "./format.js";
-import { showToast } from "./status.js";
 
 const countLabels = (labels) => countOf(Object.values(labels).flat().length, "label");
 
@@ -21,10 +20,8 @@ function showQuestion(title, texts, buttons) {
   const dialog = byId("question");
   return new Promise((resolve) => {
     const row = make("div", "answers", ...buttons.map(({ value, label }) => {
-      const button = make("button", "", label);
-      button.type = "button";
+      const button = makeButton("", () => { dialog.close(); resolve(value); }, label);
       button.dataset.value = value;
-      button.addEventListener("click", () => { dialog.close(); resolve(value); });
       return button;
     }));
     const heading = make("h2", "", title);

@@ -1,6 +1,6 @@
 // Playback: the time of the video, or of the page's own clock where there is no video.
 
-import { addressWithToken } from "../web/api.js";
+import { addressWithToken } from "../web/connection.js";
 import { byId, make, setText } from "../web/dom.js";
 import { readStored, writeStored } from "./saver.js";
 

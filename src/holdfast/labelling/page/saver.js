@@ -1,6 +1,6 @@
 // Save the labels: in the browser at once, and with the service a moment later.
 
-import { callService } from "../web/api.js";
+import { callService } from "../web/connection.js";
 
 const SAVE_DELAY = 300; // [ms] after the last change
 const RETRY_DELAYS = [1000, 2000, 5000, 10000]; // [ms]

@@ -1,7 +1,8 @@
-// Banner with the state of the hand, alert below it, and status line at the foot of the page.
+// Banner with the state of the hand, and status line at the foot of the page.
 
-import { byId, make, setText } from "../web/dom.js";
-import { NO_VALUE, delay, isLate, latency, stateKey, stateWord } from "./format.js";
+import { byId, make, setShape, setText } from "../web/dom.js";
+import { NO_VALUE, stateKey } from "../web/text.js";
+import { delay, isLate, latency, stateWord } from "./format.js";
 
 const ANNOUNCE_INTERVAL = 1500; // [ms]; a screen reader cannot follow 20 announcements a second
 
@@ -23,7 +24,7 @@ export class HandBanner {
     setText(byId("hand-word"), word);
     if (this.box.dataset.state !== key) {
       this.box.dataset.state = key;
-      byId("hand-shape").setAttribute("href", `#shape-${key}`);
+      setShape(this.box.querySelector(".shape"), key);
     }
     const now = performance.now();
     if (word !== this.announced.text && now - this.announced.at > ANNOUNCE_INTERVAL) {
@@ -31,13 +32,6 @@ export class HandBanner {
       byId("hand-spoken").textContent = `Hand: ${word.toLowerCase()}`;
     }
   }
-}
-
-/** Show the first of these texts that is not empty, or hide the alert. */
-export function showAlert(...texts) {
-  const text = texts.find(Boolean) ?? "", box = byId("alert");
-  setText(box, text);
-  box.hidden = !text;
 }
 
 /** Status line at the foot of the page. */

@@ -1,9 +1,9 @@
 // Cards of the fingers: state, values, faults and taxel map of each.
 
-import { make, shape, setText } from "../web/dom.js";
-import { fingerColour } from "../web/theme.js";
+import { make, makeButton, setShape, setText, shape } from "../web/dom.js";
+import { number, percent, stateKey, unitWord } from "../web/text.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { debounceNote, distance, faultWord, hasSlipRule, number, percent, reasonWord, shownProbability, slipSpeed, stateKey, stateWord, unitWord } from "./format.js";
+import { debounceNote, distance, faultWord, hasSlipRule, reasonWord, shownProbability, slipSpeed, stateWord } from "./format.js";
 
 // Range of the sigma bar by unit, from noise to a strong slip.
 const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
@@ -94,9 +94,6 @@ class Card {
   constructor(name, sensor, scales, index, hello, onChoose) {
     this.sensor = sensor;
     this.hello = hello;
-    const swatch = make("i", "swatch");
-    swatch.style.background = fingerColour(index);
-    swatch.dataset.finger = index;
     this.shape = shape("unknown");
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
@@ -104,12 +101,10 @@ class Card {
     this.slid = make("span", "slid");
     this.speed = make("span", "speed");
     this.slip = make("span", "slips", shape("slip"), make("span", "slips-word", "slips"), this.slid, this.speed);
-    const title = make("span", "name", swatch, make("span", "", name));
+    const title = make("span", "name", name);
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason, this.slip), this.word));
-    this.head.type = "button";
+    this.head = makeButton("head", onChoose, this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason, this.slip), this.word));
     this.head.title = `Plots of ${name} (${index + 1})`;
-    this.head.addEventListener("click", onChoose);
     const canvas = make("canvas");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `Taxel map of ${name}`);
@@ -169,7 +164,7 @@ class Card {
     setText(this.longReason, longReason);
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
-    this.shape.firstChild.setAttribute("href", `#shape-${key}`);
+    setShape(this.shape, key);
   }
 
   // Say that the finger slides, whatever its state, and how far and how fast, if the model has a

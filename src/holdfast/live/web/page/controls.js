@@ -1,22 +1,12 @@
 // Buttons for tare, recording, markers and full screen, and the messages about their results.
 
-import { callService } from "../web/api.js";
-import { byId, make, setText } from "../web/dom.js";
+import { callService } from "../web/connection.js";
+import { byId, setText, showToast } from "../web/dom.js";
 import { clock, fileSize } from "./format.js";
 
-const TOAST_TIME = 6000; // [ms]
-const MAX_TOASTS = 4;
 const FLASH_TIME = 400; // [ms], dark and then bright
 // The first callback comes before the page is painted, the second one after it.
 const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-
-/** Show a short message; `kind` is "good" or "bad". */
-export function toast(text, kind) {
-  const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
-  toasts.append(box);
-  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
-  setTimeout(() => box.remove(), TOAST_TIME);
-}
 
 export class Controls {
   /** @param onMarker is called with the text of each marker that the service accepted. */
@@ -29,11 +19,6 @@ export class Controls {
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
     byId("full").addEventListener("click", () => this.toggleFullScreen());
-    byId("help").addEventListener("click", () => byId("help-box").showModal());
-    // Remove the focus after a click: the space bar then means "pause", not this button again.
-    document.addEventListener("click", (event) => {
-      if (event.detail > 0) event.target.closest?.("button")?.blur();
-    });
     this.show();
   }
 
@@ -69,7 +54,7 @@ export class Controls {
     try {
       await work();
     } catch (error) {
-      toast(error.message, "bad");
+      showToast(error.message, "bad");
     } finally {
       button.classList.remove("busy");
     }
@@ -78,7 +63,7 @@ export class Controls {
   tare() {
     return this.request(byId("tare"), async () => {
       await callService("POST", "tare");
-      toast("Taking the tare: nothing may touch the fingers", "good");
+      showToast("Taking the tare: nothing may touch the fingers", "good");
     });
   }
 
@@ -87,10 +72,10 @@ export class Controls {
       if (this.recording) {
         const { path, seconds } = await callService("DELETE", "recording");
         this.update(null);
-        toast(`${clock(seconds ?? 0)} recorded: ${path}`, "good");
+        showToast(`${clock(seconds ?? 0)} recorded: ${path}`, "good");
       } else {
         const { path } = await callService("POST", "recording", {});
-        toast(`Recording to ${path}`, "good");
+        showToast(`Recording to ${path}`, "good");
       }
     });
   }
@@ -123,6 +108,6 @@ export class Controls {
   toggleFullScreen() {
     const done = document.fullscreenElement
       ? document.exitFullscreen() : document.documentElement.requestFullscreen();
-    done.catch(() => toast("The browser does not allow full screen here", "bad"));
+    done.catch(() => showToast("The browser does not allow full screen here", "bad"));
   }
 }

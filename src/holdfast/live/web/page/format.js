@@ -2,11 +2,9 @@
 
 import { NO_VALUE, withSpaces } from "../web/text.js";
 
-export * from "../web/text.js";
-
 // The code of a state in a series is its index in this list.
 export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
-export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
+export const UNKNOWN = 0;
 
 const REASONS = {
   tare: "taking tare",
@@ -16,10 +14,6 @@ const REASONS = {
   load: "load changes",
   hold: "hold time",
 };
-
-/** Return the key of a state in class names, shapes and colours: "no-contact". */
-export const stateKey = (state) =>
-  STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
 
 /** Return whether samples arrive late enough to be worth a colour; as MIN_LATE_DELAY [s]. */
 export const isLate = (seconds) => seconds > 0.1;
@@ -68,14 +62,6 @@ export const slipSpeed = (speed) => `${distance(speed)}/s`;
 
 const note = (short, long) => ({ short, long });
 const seconds = (value) => `${Number(value.toPrecision(2))} s`;
-
-/** Format a duration in few characters: "0.8 s", "12 s", "3 min", "2 h". */
-export function duration(seconds) {
-  if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
-  if (seconds < 99.5) return `${seconds.toFixed(0)} s`;
-  if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
-  return `${Math.round(seconds / 3600)} h`;
-}
 
 /** Format a latency: "0.21 ms", "12 ms", "1.3 s". */
 export function latency(seconds) {

@@ -1,7 +1,8 @@
 // Lists of the newest events and notices, newest first.
 
 import { make, shape, setText } from "../web/dom.js";
-import { distance, duration, stateKey, stateWord, wallTime } from "./format.js";
+import { duration, stateKey } from "../web/text.js";
+import { distance, stateWord, wallTime } from "./format.js";
 
 const MAX_ITEMS = 50;
 const CHANGE_TIME = 0.25; // [s] between the same changes of two fingers that are one change

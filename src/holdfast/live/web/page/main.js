@@ -1,15 +1,15 @@
 // Connects the parts of the page: messages arrive at the service's pace, drawing follows the
 // browser's.
 
-import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
+import { Connection } from "../web/connection.js";
+import { byId, fillChoice, make, setPressed, setText, showAlert, swatch } from "../web/dom.js";
+import { listenToKeys } from "../web/help.js";
+import { duration } from "../web/text.js";
 import { fingerColour, onTheme } from "../web/theme.js";
-import { HandBanner, HealthLine, showAlert } from "./banner.js";
+import { HandBanner, HealthLine } from "./banner.js";
 import { Cards } from "./cards.js";
-import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
-import { STATES, duration, hasSlipRule } from "./format.js";
-import { FrameLimiter } from "./frame_rate.js";
-import { listenToKeys } from "./keys.js";
+import { STATES, hasSlipRule } from "./format.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
 import { SampleStore, capacityFor } from "./store.js";
@@ -17,6 +17,7 @@ import { ThresholdPanel } from "./threshold.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
 const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
+const MAX_DRAW_TIME = 1000; // [ms]; a longer time means that the tab was hidden
 
 class Page {
   constructor() {
@@ -33,24 +34,35 @@ class Page {
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
     this.dirty = false;
-    this.limiter = new FrameLimiter();
+    this.drawnAt = this.nextDrawing = null; // [ms]
     this.agesUpdatedAt = -Infinity;
-    fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
+    fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, title: `Show ${value} seconds`, content: [`${value} s`] })),
       this.plots.window, (value) => this.setWindow(value));
     byId("pause").addEventListener("click", () => this.togglePause());
-    listenToKeys({
-      " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
-      m: () => this.controls.mark(), l: () => this.controls.flash(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
-      p: () => this.threshold.toggle(), k: () => this.togglePause(),
-      digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
-    });
-    onTheme(() => this.updateColours());
-    this.connection = new Connection({
+    listenToKeys({ "Keyboard shortcuts": this.keys() });
+    onTheme(() => { this.redrawPlots(); this.cards.draw(); });
+    this.connection = new Connection("api/v1/live", "holdfast.live/1", {
       hello: (message) => this.start(message),
       live: (message) => this.update(message),
       state: (link, reason) => this.setLink(link, reason),
     });
-    requestAnimationFrame(() => this.draw());
+    requestAnimationFrame((now) => this.draw(now));
+  }
+
+  keys() {
+    const fingers = Array.from({ length: 9 }, (_, k) => [k + 1, () => this.chooseFinger(this.plots.names?.[k] ?? this.plots.chosen)]);
+    const pause = () => this.togglePause(), { controls } = this;
+    return [
+      ["Space K", "pause plots and maps", { " ": pause, k: pause }],
+      ["1 – 9", "show the plots of this finger", Object.fromEntries(fingers)],
+      ["0", "show the plots of all fingers", { 0: () => this.chooseFinger(null) }],
+      ["T", "take a new tare", { t: () => controls.tare() }],
+      ["P", "show or hide the threshold", { p: () => this.threshold.toggle() }],
+      ["R", "start or stop a recording", { r: () => controls.record() }],
+      ["M", "add a marker with the text of the field", { m: () => controls.mark() }],
+      ["L", "light up the page for a camera, and mark when", { l: () => controls.flash() }],
+      ["F", "full screen", { f: () => controls.toggleFullScreen() }],
+    ];
   }
 
   start(hello) {
@@ -117,22 +129,26 @@ class Page {
 
   showLink() {
     const { link, reason, ended, silent, problem } = this.status, open = link === "open";
-    showAlert(
+    showAlert([
       link === "refused" && `Not connected: ${reason}`,
       link === "lost" && "Connection lost, trying again …",
       open && ended && "Source ended: these are its last values",
       open && silent && !this.restarts && "No samples from the source",
       open && problem,
-    );
+    ].find(Boolean) || "");
     const words = { connecting: "connecting", open: ended ? "source ended" : "connected", lost: "connection lost", refused: "not connected" };
     this.health.showConnection(open && (ended || silent) ? "quiet" : link, words[link]);
   }
 
-  draw() {
-    requestAnimationFrame(() => this.draw());
-    if (!this.limiter.mayDraw() || !this.store || !this.dirty) return;
+  // Drawing takes at most half of the browser's time: scripts, layout and painting up to the next frame.
+  draw(now) {
+    requestAnimationFrame((next) => this.draw(next));
+    if (this.drawnAt !== null) this.nextDrawing = now + Math.min(MAX_DRAW_TIME, now - this.drawnAt);
+    this.drawnAt = null;
+    // Half a frame too early is better than a whole frame too late.
+    if (!this.store || !this.dirty || now < this.nextDrawing - 8) return;
     this.dirty = false;
-    this.limiter.startDrawing();
+    this.drawnAt = now;
     if (!this.frozen) {
       this.cards.draw();
       if (this.store.end) this.plots.draw(this.store);
@@ -178,13 +194,10 @@ class Page {
   }
 
   fillFingers() {
-    const swatch = (k) => {
-      const mark = make("i", "swatch");
-      mark.style.background = fingerColour(k);
-      return mark;
-    };
-    const fingers = this.plots.names.map((name, k) => ({ value: name, label: name, title: `Plots of ${name} (${k + 1})`, mark: swatch(k) }));
-    fillChoice(byId("fingers"), [{ value: "", label: "all", title: "Plots of all fingers (0)" }, ...fingers],
+    const fingers = this.plots.names.map((name, k) => ({
+      value: name, title: `Plots of ${name} (${k + 1})`, content: [swatch(fingerColour(k)), make("span", "", name)],
+    }));
+    fillChoice(byId("fingers"), [{ value: "", title: "Plots of all fingers (0)", content: ["all"] }, ...fingers],
       this.plots.chosen ?? "", (name) => this.chooseFinger(name || null));
     this.cards.choose(this.plots.chosen);
   }
@@ -203,15 +216,6 @@ class Page {
       "modules (taxels)": modules, since: new Date(1000 * hello.started).toLocaleString("en-GB"),
     };
     byId("stream").replaceChildren(...Object.entries(rows).flatMap(([name, value]) => [make("dt", "", name), make("dd", "", String(value))]));
-  }
-
-  updateColours() {
-    if (!this.store) return;
-    document.querySelectorAll(".card .swatch").forEach((mark) => { mark.style.background = fingerColour(Number(mark.dataset.finger)); });
-    this.fillFingers();
-    this.plots.build();
-    this.redrawPlots();
-    this.cards.draw();
   }
 }
 

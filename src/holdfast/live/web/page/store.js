@@ -1,5 +1,6 @@
 // Samples of the last minute, in memory of constant size.
 
+import { indexAt } from "../web/store.js";
 import { STATES, UNKNOWN, shownProbability } from "./format.js";
 
 const SECONDS = 60;
@@ -86,27 +87,7 @@ export class SampleStore {
   }
 
   /** Return a copy, for plots that are paused. */
-  copy() {
-    const copy = new SampleStore([], 0);
-    Object.assign(copy, { capacity: this.capacity, end: this.end, removed: this.removed });
-    copy.times = this.times.slice();
-    copy.hand = this.hand.slice();
-    copy.fingers = new Map([...this.fingers].map(([name, columns]) => [
-      name, Object.fromEntries(Object.entries(columns).map(([key, array]) => [key, array.slice()])),
-    ]));
-    return copy;
-  }
-
-  /** Return the index of the first stored sample that is not before `time`. */
-  indexOf(time) {
-    let low = this.start, high = this.end;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.times[middle] < time) low = middle + 1;
-      else high = middle;
-    }
-    return low;
-  }
+  copy() { return Object.assign(new SampleStore([], 0), structuredClone({ ...this })); }
 }
 
 function repeatPrevious(columns, index) {
@@ -141,7 +122,7 @@ function writeSample(columns, index, from, k) {
  */
 export function downsample(store, window, bins, arrays) {
   const now = store.latest ?? 0;
-  const first = Math.max(store.start, store.indexOf(now - window) - 1);
+  const first = Math.max(store.start, indexAt(store.times, now - window, store.start, store.end) - 1);
   const stride = 2 ** Math.max(0, Math.ceil(Math.log2((store.end - first) / bins)));
   const x = [], indices = [], columns = arrays.map(() => []);
   let start = stride === 1 ? first : Math.ceil((first + store.removed) / stride) * stride - store.removed;

@@ -1,8 +1,8 @@
 // Map of the taxels of one sensor: a disc for the normal reading, an arrow for the shear.
 
+import { number, unitWord } from "../web/text.js";
 import { colours, font, lightTheme } from "../web/theme.js";
 import { hull, layout, toMapFrame } from "./layout.js";
-import { number, unitWord } from "./format.js";
 
 const FONT = font(11);
 // Minimum full scale by unit: smaller readings are noise.

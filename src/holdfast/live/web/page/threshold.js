@@ -1,9 +1,9 @@
 // Panel with the threshold of the probability: the expected errors, and the live detector's value.
 
-import { callService } from "../web/api.js";
-import { byId, setText } from "../web/dom.js";
-import { toast } from "./controls.js";
-import { number, share } from "./format.js";
+import { callService } from "../web/connection.js";
+import { byId, setText, showToast } from "../web/dom.js";
+import { number } from "../web/text.js";
+import { share } from "./format.js";
 
 /** Return the point of the validation that is nearest to a threshold; null if there is none. */
 function nearestPoint(points, threshold) {
@@ -94,7 +94,7 @@ export class ThresholdPanel {
     try {
       await callService(method, "threshold", body);
     } catch (error) {
-      toast(error.message, "bad");
+      showToast(error.message, "bad");
     } finally {
       this.moving = false;
       this.middle = null; // show the service's value, whatever it is

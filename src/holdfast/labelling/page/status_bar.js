@@ -1,26 +1,9 @@
-// Messages to the person who labels: alert, toasts, and the status bar.
+// Status bar: whether the labels are saved, the item that keys act on, and the time window.
 
 import { byId, make, setText, shape } from "../web/dom.js";
-import { dateText, labelText, percent, spanText, stateKey, timeText } from "./format.js";
+import { percent, stateKey, timeText } from "../web/text.js";
+import { dateText, labelText, spanText } from "./format.js";
 import { LOW_CONFIDENCE } from "./labels.js";
-
-const TOAST_DURATION = 6000; // [ms]
-const MAX_TOASTS = 4;
-
-/** Show a short message for a few seconds; `kind` is "good" or "bad". */
-export function showToast(text, kind) {
-  const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
-  toasts.append(box);
-  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
-  setTimeout(() => box.remove(), TOAST_DURATION);
-}
-
-/** Show a line above the page until it is replaced; an empty text hides it. */
-export function showAlert(text) {
-  const box = byId("alert");
-  if (box.textContent !== text) box.textContent = text;
-  box.hidden = !text;
-}
 
 const SAVE_TEXTS = {
   saving: "saving …", waiting: "not saved yet …", none: "no labels yet",
