@@ -1,8 +1,9 @@
 // Commands that keys and buttons run.
 
 import { callService } from "../web/connection.js";
-import { byId, showToast } from "../web/dom.js";
+import { byId, runOnce, showToast } from "../web/dom.js";
 import { listenToKeys } from "../web/help.js";
+import { percent } from "../web/text.js";
 import { CAUSES, causeKey, countOf, STATES } from "./format.js";
 
 const FORCES = ["F_a", "F_x", "F_y", "F_z", "xyz"];
@@ -22,7 +23,7 @@ export class Commands {
     on("next-recording", "click", () => this.openNeighbour(1));
     on("force", "change", (event) => this.rows.showForce(event.target.value));
     on("note", "input", (event) => this.editor.setNote(event.target.value));
-    on("propose", "click", () => this.propose());
+    on("propose", "click", (event) => runOnce(event.target, () => this.propose()));
     on("accept-all", "click", () => this.acceptAll());
     on("next-item", "click", () => this.nextReviewItem());
     on("toggle-side", "click", () => this.toggleSidePanel());
@@ -70,8 +71,7 @@ export class Commands {
   remove() { this.editor.remove(); }
 
   copy() {
-    if (this.editor.copy()) return;
-    showToast(this.editor.readOnly ? READ_ONLY : "Draw or select a label first: A copies it to all fingers", "bad");
+    if (!this.editor.copy()) showToast(this.editor.readOnly ? READ_ONLY : "Draw or select a label first: A copies it to all fingers", "bad");
   }
 
   /**
@@ -79,17 +79,12 @@ export class Commands {
    * label of low confidence, else the item in focus, else the next proposal; null if none is left.
    */
   target() {
-    const { editor } = this, { hoveredProposal } = this.rows;
-    if (hoveredProposal && editor.proposals.some(({ item }) => item === hoveredProposal.item)) {
-      return { kind: "proposal", ...hoveredProposal };
-    }
-    const { chosen, focus } = editor;
-    if (chosen && chosen.label.confidence < 1 && editor.reviewItems.some(({ item }) => item === chosen.label)) {
-      return { kind: "label", finger: chosen.finger, item: chosen.label };
-    }
-    const isFocus = (each) => each.item === focus?.item;
-    if (focus && (editor.reviewItems.some(isFocus) || editor.proposals.some(isFocus))) return focus;
-    return editor.proposals.length ? { kind: "proposal", ...editor.proposals[0] } : null;
+    const { proposals, reviewItems, chosen, focus } = this.editor;
+    const proposalOf = (item) => proposals.find((each) => each.item === item), review = (item) => reviewItems.find((each) => each.item === item);
+    const proposal = proposalOf(this.rows.hoveredProposal?.item);
+    if (proposal) return { kind: "proposal", ...proposal };
+    const doubtful = review(chosen?.label) ?? (focus && (review(focus.item) || proposalOf(focus.item)) && focus);
+    return doubtful || (proposals.length ? { kind: "proposal", ...proposals[0] } : null);
   }
 
   accept() { this.decide((target) => this.editor.accept(target)); }
@@ -98,19 +93,19 @@ export class Commands {
   // Run `act` on the target. A target outside the window is only shown first.
   decide(act) {
     const target = this.target();
-    if (!target) { showToast("No proposal is open", "good"); return; }
-    if (this.editor.readOnly) { showToast(READ_ONLY, "bad"); return; }
+    if (!target) return showToast("No proposal is open", "good");
+    if (this.editor.readOnly) return showToast(READ_ONLY, "bad");
     const hovered = this.rows.hoveredProposal?.item === target.item;
     if (!this.view.contains(target.item) && !hovered) {
       this.view.reveal(target.item);
-      this.editor.setFocus(target);
-      return;
+      return this.editor.setFocus(target);
     }
     const next = this.itemAfter(target);
     act(target);
     this.rows.hoveredProposal = null;
     this.editor.setFocus(next);
     if (next && !hovered && !this.view.contains(next.item)) this.view.reveal(next.item);
+    return undefined;
   }
 
   // Return the next review item if the target comes from the review list, else the next proposal in time.
@@ -119,16 +114,15 @@ export class Commands {
     if (target.kind !== "proposal" || editor.lastReviewed?.item === target.item) {
       return editor.reviewItems.find(({ item }) => item !== target.item) ?? null;
     }
-    const index = editor.proposals.findIndex(({ item }) => item === target.item);
-    const next = editor.proposals[index + 1] ?? editor.proposals.find(({ item }) => item !== target.item);
+    const { proposals } = editor, index = proposals.findIndex(({ item }) => item === target.item);
+    const next = proposals[index + 1] ?? proposals[index && 0];
     return next ? { kind: "proposal", ...next } : null;
   }
 
   acceptAll() {
     const minConfidence = Math.max(0, Math.min(1, byId("min-confidence").valueAsNumber / 100 || 0));
-    const n = this.editor.acceptAll(minConfidence), limit = `${Math.round(100 * minConfidence)} %`;
-    if (n) showToast(`${countOf(n, "proposal")} with a confidence of at least ${limit} accepted`, "good");
-    else showToast(`No open proposal has a confidence of at least ${limit}`, "bad");
+    const n = this.editor.acceptAll(minConfidence);
+    showToast(`${countOf(n, "proposal")} with a confidence of at least ${percent(minConfidence)} accepted`, n ? "good" : "bad");
   }
 
   nextReviewItem() {
@@ -148,24 +142,15 @@ export class Commands {
   }
 
   async propose() {
-    const { id, generation, editor } = this.page, button = byId("propose");
-    if (button.classList.contains("busy")) return;
-    button.classList.add("busy");
-    try {
-      const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
-      if (generation !== this.page.generation) return;
-      editor.recording.proposals = proposals;
-      // A new request shows all proposals again, also those that were rejected.
-      if (editor.state.rejected.size) editor.apply({ rejected: new Set() });
-      editor.focus = null;
-      this.page.editorChanged(false);
-      this.page.updateCounts();
-      showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
-    } catch (error) {
-      showToast(error.message, "bad");
-    } finally {
-      button.classList.remove("busy");
-    }
+    const { id, generation, editor } = this.page;
+    const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
+    if (generation !== this.page.generation) return;
+    editor.recording.proposals = proposals;
+    // A new request shows all proposals again, also those that were rejected.
+    if (editor.state.rejected.size) editor.apply({ rejected: new Set() });
+    editor.setFocus(null);
+    this.page.updateCounts();
+    showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
   }
 
   /** Open the previous (-1) or the next (1) recording. */

@@ -25,12 +25,10 @@ function showQuestion(title, texts, buttons) {
       return button;
     }));
     const heading = make("h2", "", title);
-    heading.id = "question-title";
     heading.tabIndex = -1;
     dialog.replaceChildren(heading, ...texts.map((text) => make("p", "", text)), row);
     // Escape must not close the dialog without a decision.
-    dialog.oncancel = (event) => event.preventDefault();
-    dialog.onkeydown = (event) => { if (event.key === "Escape") event.preventDefault(); };
+    dialog.onkeydown = (event) => event.key === "Escape" && event.preventDefault();
     dialog.showModal();
     // The heading gets the focus: Enter, pressed for a proposal, must not answer the question.
     heading.focus();
@@ -53,14 +51,8 @@ export async function offerUnsavedLabels({ editor, saver }, recording, unsaved) 
 /** Ask which labels to keep after another page or program has saved the file; then go on saving. */
 export async function resolveConflict(page) {
   const { id, generation, editor, saver } = page;
-  let file;
-  try {
-    file = await callService("GET", `recordings/${id}`);
-  } catch (error) {
-    showToast(error.message, "bad");
-    return;
-  }
-  if (generation !== page.generation) return;
+  const file = await callService("GET", `recordings/${id}`).catch((error) => showToast(error.message, "bad"));
+  if (!file || generation !== page.generation) return;
   const by = [file.author && ` by ${file.author}`, file.time && `, ${dateText(file.time)}`].filter(Boolean).join("");
   const answer = await ask("The label file was changed by another page or program", [
     `In the file: ${countLabels(file.labels)}${by}.`,

@@ -73,21 +73,14 @@ class LabellingPage {
     this.pointer.cancelDrag();
     await this.saver.flush();
     if (generation !== this.generation) return;
-    if (this.saver.dirty) {
-      const { name } = this.saver.recording;
-      showToast(`${name} is not saved. This browser keeps its labels and offers them when you open the recording again.`, "bad");
-    }
+    if (this.saver.dirty) showToast(`${this.saver.recording.name} is not saved. This browser keeps its labels and offers them again.`, "bad");
     this.id = id;
     window.history.replaceState(null, "", `#${id}`);
     this.recordings.markCurrent(id);
-    let recording;
-    try {
-      recording = await callService("GET", `recordings/${id}`);
-    } catch (error) {
-      if (generation === this.generation) this.openFailed(id, error);
-      return;
-    }
-    if (generation === this.generation) this.opened(recording, generation);
+    const recording = await callService("GET", `recordings/${id}`).catch((error) => ({ error }));
+    if (generation !== this.generation) return;
+    if (recording.error) this.openFailed(id, recording.error);
+    else this.opened(recording, generation);
   }
 
   // Show an empty recording, so that the labels of the previous one disappear.
@@ -146,17 +139,17 @@ class LabellingPage {
   }
 
   updateCounts() {
-    const { state, proposals, reviewItems } = this.editor;
-    this.recordings.update(this.id, {
-      n_labels: Object.values(state.labels).flat().length, n_proposals: proposals.length, n_doubtful: reviewItems.length,
-    });
+    const { state, reviewItems } = this.editor;
+    this.recordings.update(this.id, { n_labels: Object.values(state.labels).flat().length, n_doubtful: reviewItems.length });
   }
 
   /** Show a change of labels, selection, focus or preview; `unsaved` if it must be saved. */
   editorChanged(unsaved) {
     if (!this.commands) return;
-    if (unsaved) this.saver.update(this.editor.state);
-    if (unsaved) this.updateCounts();
+    if (unsaved) {
+      this.saver.update(this.editor.state);
+      this.updateCounts();
+    }
     this.toolbar.show();
     this.reviewList.show();
     this.showStatus();

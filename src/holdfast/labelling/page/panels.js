@@ -13,11 +13,7 @@ function scrollToRow(row, list) {
 }
 
 // Return how far a recording is labelled: "error", "saved", "inside" its file, or "none".
-function progressOf(entry) {
-  if (entry.error) return "error";
-  if (entry.labelled) return "saved";
-  return entry.n_labels ? "inside" : "none";
-}
+const progressOf = (entry) => (entry.error ? "error" : entry.labelled ? "saved" : entry.n_labels ? "inside" : "none");
 
 // Return the most important fact of a recording.
 function summaryOf(entry) {
@@ -46,10 +42,7 @@ export class RecordingList {
   show(entry) {
     const row = byId("recordings").querySelector(`[data-id="${entry.id}"]`);
     if (!row) return;
-    row.title = entry.error ?? [
-      entry.name, duration(entry.duration), countOf(entry.n_labels, "label"),
-      countOf(entry.n_proposals, "open proposal"), `${entry.n_doubtful} to review`,
-    ].join(" · ");
+    row.title = entry.error ?? [entry.name, duration(entry.duration), countOf(entry.n_labels, "label")].join(" · ");
     row.dataset.progress = progressOf(entry);
     row.lastElementChild.replaceChildren(summaryOf(entry));
     row.lastElementChild.classList.toggle("warn", Boolean(entry.error || entry.n_doubtful));
@@ -63,10 +56,8 @@ export class RecordingList {
   }
 
   showProgress() {
-    const kinds = this.all.map(progressOf), inside = kinds.filter((kind) => kind === "inside").length;
-    const n = inside + kinds.filter((kind) => kind === "saved").length;
-    setText(byId("progress"), `${n} of ${this.all.length} labelled${inside ? `, ${inside} as imported` : ""}`);
-    byId("progress-bar").style.transform = `scaleX(${this.all.length ? n / this.all.length : 0})`;
+    const n = this.all.filter((entry) => ["saved", "inside"].includes(progressOf(entry))).length;
+    setText(byId("progress"), `${n} of ${this.all.length} labelled`);
   }
 
   markCurrent(id) {
@@ -78,10 +69,7 @@ export class RecordingList {
   }
 
   /** Return the recording before (-1) or after (1) another; undefined at the ends of the list. */
-  neighbour(id, step) {
-    const index = this.all.findIndex((each) => each.id === id);
-    return this.all[index + step];
-  }
+  neighbour(id, step) { return this.all[this.all.findIndex((each) => each.id === id) + step]; }
 }
 
 /** List of the items to review, those of the lowest confidence first, and the number of open proposals. */
@@ -110,7 +98,7 @@ export class ReviewList {
   row(each) {
     const { kind, finger, item } = each;
     const button = makeButton("review-item", () => this.choose(each), shape(stateKey(item.state)), make("span", "finger", finger),
-      make("span", "text", labelText(item)), make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
+      make("span", "name", labelText(item)), make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
     button.dataset.state = stateKey(item.state);
     button.title = `This ${kind} has a low confidence`;
     return make("li", "", button);

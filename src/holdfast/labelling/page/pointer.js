@@ -6,7 +6,7 @@ const MIN_DRAG_DISTANCE = 4; // [px], a shorter movement is a click
 const EDGE_REACH = { mouse: 6, pen: 8, touch: 16 }; // [px]
 const SNAP_DISTANCE = 9; // [px]
 const MIN_PINCH_DISTANCE = 8; // [px]
-const LINE_HEIGHT = 16, PAGE_HEIGHT = 400; // [px], of wheels that count in lines or pages
+const WHEEL_UNITS = [1, 16, 400]; // [px], of wheels that count in pixels, lines or pages
 
 export class Pointer {
   /**
@@ -63,10 +63,9 @@ export class Pointer {
   snapped(event, finger, time, moved = null) {
     if (event.altKey) return time;
     const { low, high } = this.editor.bounds;
-    const edges = Object.values(this.editor.state.labels).flat()
-      .filter((label) => label !== moved).flatMap((label) => [label.start, label.end]);
-    const others = moved ? edges.filter((edge) => edge !== moved.start && edge !== moved.end) : edges;
-    return snap(time, [low, high, ...others, ...(this.rows.changePoints[finger] ?? [])], SNAP_DISTANCE * this.view.secondsPerPixel);
+    const edges = Object.values(this.editor.state.labels).flat().flatMap((label) => [label.start, label.end])
+      .filter((edge) => edge !== moved?.start && edge !== moved?.end);
+    return snap(time, [low, high, ...edges, ...(this.rows.changePoints[finger] ?? [])], SNAP_DISTANCE * this.view.secondsPerPixel);
   }
 
   press(event) {
@@ -106,10 +105,7 @@ export class Pointer {
     if (!drag.started) return;
     if (drag.mode === "pinch") this.pinch();
     else if (drag.mode === "pan") this.view.pan((lastX - event.clientX) * this.view.secondsPerPixel);
-    else {
-      this.panBeyondEdge(found.x);
-      this.applyDrag(event, false);
-    }
+    else this.applyDrag(event, false);
     this.hover({ ...found, time: this.rows.snapTime ?? found.time });
   }
 
@@ -122,28 +118,14 @@ export class Pointer {
     this.view.setWindow(start, start + secondsPerPixel * this.view.width);
   }
 
-  // A drag beyond the left or right edge of the plot moves the window.
-  panBeyondEdge(x) {
-    const beyond = Math.min(0, x) + Math.max(0, x - this.view.width);
-    if (beyond) this.view.pan(0.3 * beyond * this.view.secondsPerPixel);
-  }
-
   // Change labels as the drag demands, or only preview it unless `commit`.
   applyDrag(event, commit) {
     const { mode, finger, edge, from } = this.drag, { time } = this.find(event);
-    if (mode === "edge" || mode === "label") {
-      const to = this.snapped(event, finger, time, edge?.label);
-      this.rows.snapTime = to === time ? null : to;
-      if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
-      else this.editor.draw(this.fingersOf(event, finger), from, to, commit);
-    }
-    if (commit) this.rows.snapTime = null;
-  }
-
-  // Return the finger of a drag; with Ctrl all fingers, this one first.
-  fingersOf(event, finger) {
-    if (!event.ctrlKey && !event.metaKey) return [finger];
-    return [finger, ...this.editor.fingers.filter((name) => name !== finger)];
+    if (mode !== "edge" && mode !== "label") return;
+    const to = this.snapped(event, finger, time, edge?.label), isForAll = event.ctrlKey || event.metaKey;
+    this.rows.snapTime = commit || to === time ? null : to;
+    if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
+    else this.editor.draw(isForAll ? [finger, ...this.editor.fingers.filter((name) => name !== finger)] : [finger], from, to, commit);
   }
 
   release(event) {
@@ -199,7 +181,7 @@ export class Pointer {
   // The wheel zooms; a sideways movement, or Shift, moves the window.
   wheel(event) {
     event.preventDefault();
-    const unit = event.deltaMode === 1 ? LINE_HEIGHT : event.deltaMode === 2 ? PAGE_HEIGHT : 1;
+    const unit = WHEEL_UNITS[event.deltaMode];
     const sideways = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
     if (Math.abs(sideways) > Math.abs(event.shiftKey ? 0 : event.deltaY)) {
       this.view.pan(sideways * unit * this.view.secondsPerPixel);

@@ -62,15 +62,11 @@ export class Signals {
     const from = Math.max(this.start, start - margin), to = Math.min(this.end, end + margin);
     const points = Math.min(MAX_POINTS, Math.round((PAIRS_PER_PIXEL * width * (to - from)) / (end - start)));
     this.loading = true;
-    let data = null, problem = null;
-    try {
-      data = await this.fetch(from, to, Math.max(MIN_POINTS, points));
-    } catch (error) {
-      problem = error;
-    }
+    let problem = null;
+    const data = await this.fetch(from, to, Math.max(MIN_POINTS, points)).catch((error) => { problem = error; });
     if (generation !== this.generation) return;
     this.loading = false;
-    if (data) this.fine = data;
+    this.fine = data ?? this.fine;
     this.joined.clear();
     this.arrived(problem);
     if (!problem && this.requested.some((value, k) => value !== [start, end, width][k])) this.request(...this.requested);

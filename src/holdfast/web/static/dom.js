@@ -78,6 +78,14 @@ export function showToast(text, kind) {
   setTimeout(() => box.remove(), TOAST_TIME);
 }
 
+/** Do the work of a button, once at a time: a double click counts once. Show why it fails. */
+export async function runOnce(button, work) {
+  if (button.matches(":disabled, .busy")) return;
+  button.classList.add("busy");
+  await work().catch((error) => showToast(error.message, "bad"));
+  button.classList.remove("busy");
+}
+
 /** Show a line above the page until it is replaced; an empty text hides it. */
 export function showAlert(text) {
   setText(byId("alert"), text);

@@ -53,7 +53,7 @@ def test_see_states_forces_and_the_taxel_map_of_a_finger(visit, service, size):
     page.click("#fingers button:first-child")
     assert page.evaluate(LINES) == list(FINGERS)
     service.change(state="NO_CONTACT", **values)
-    shows(page, f"{INDEX} .meter", r"^stable\s*–$")  # without contact nothing can be stable
+    shows(page, f"{INDEX} .values", r"^stable\s*–")  # without contact nothing can be stable
     service.change(state="UNSTABLE", **values)
     shows(page, "#events li", r"hand\s*no contact\s*→\s*unstable\s*thumb, index, middle, ring")
     shows(page, "#hand-spoken", "unstable")  # for screen readers

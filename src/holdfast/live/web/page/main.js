@@ -4,7 +4,6 @@
 import { Connection } from "../web/connection.js";
 import { byId, fillChoice, make, setPressed, setText, showAlert, swatch } from "../web/dom.js";
 import { listenToKeys } from "../web/help.js";
-import { duration } from "../web/text.js";
 import { fingerColour, onTheme } from "../web/theme.js";
 import { HandBanner, HealthLine } from "./banner.js";
 import { Cards } from "./cards.js";
@@ -16,7 +15,6 @@ import { SampleStore, capacityFor } from "./store.js";
 import { ThresholdPanel } from "./threshold.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
-const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
 const MAX_DRAW_TIME = 1000; // [ms]; a longer time means that the tab was hidden
 
 class Page {
@@ -35,7 +33,6 @@ class Page {
     this.frozen = null; // a copy of the store while the plots are paused
     this.dirty = false;
     this.drawnAt = this.nextDrawing = null; // [ms]
-    this.agesUpdatedAt = -Infinity;
     fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, title: `Show ${value} seconds`, content: [`${value} s`] })),
       this.plots.window, (value) => this.setWindow(value));
     byId("pause").addEventListener("click", () => this.togglePause());
@@ -79,11 +76,7 @@ class Page {
     byId("slip-help").hidden = !hasSlips;
     this.fillFingers();
     this.showStream(hello);
-    this.showAdvice(hello.advice ?? []);
-  }
-
-  showAdvice(texts) {
-    for (const text of texts.filter((one) => !this.advised.has(one))) {
+    for (const text of (hello.advice ?? []).filter((advice) => !this.advised.has(advice))) {
       this.advised.add(text);
       this.notices.add({ time: Date.now() / 1000, text });
     }
@@ -91,18 +84,15 @@ class Page {
 
   update(message) {
     if (!this.store) return;
-    this.status.ended = Boolean(message.ended);
-    this.status.silent = Boolean(message.health?.silent);
-    this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
+    const problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
+    Object.assign(this.status, { ended: Boolean(message.ended), silent: Boolean(message.health?.silent), problem });
     this.plots.thresholds = message.thresholds ?? {};
     this.threshold.update(message.thresholds);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
-    const { ended, silent } = this.status;
     // An old STABLE must not look like a current one.
-    const pause = this.restarts ? "NEXT GRASP" : "NO SAMPLES";
-    if (ended || silent) this.banner.showState("UNKNOWN", ended ? "SOURCE ENDED" : pause);
-    else this.banner.showState(message.hand);
+    const { ended, silent } = this.status, word = ended ? "SOURCE ENDED" : this.restarts ? "NEXT GRASP" : "NO SAMPLES";
+    this.banner.showState(ended || silent ? "UNKNOWN" : message.hand, ended || silent ? word : undefined);
     this.cards.setOutdated(ended || silent);
     this.cards.update(message);
     for (const event of message.events ?? []) this.events.add(event);
@@ -118,8 +108,7 @@ class Page {
     // The reason of a refusal stays visible during further attempts.
     if (link === "lost" && this.status.link === "refused") return;
     Object.assign(this.status, { link, reason });
-    this.controls.setConnected(link === "open");
-    this.threshold.setConnected(link === "open");
+    for (const id of ["actions", "threshold-panel"]) byId(id).disabled = link !== "open";
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -149,15 +138,9 @@ class Page {
     if (!this.store || !this.dirty || now < this.nextDrawing - 8) return;
     this.dirty = false;
     this.drawnAt = now;
-    if (!this.frozen) {
-      this.cards.draw();
-      if (this.store.end) this.plots.draw(this.store);
-    } else if (Number.isFinite(this.now)) {
-      setText(byId("paused"), `PAUSED · ${duration(this.now - this.frozen.latest)} ago`);
-    }
-    if (performance.now() - this.agesUpdatedAt < AGE_INTERVAL) return;
-    this.agesUpdatedAt = performance.now();
-    this.events.updateAges(this.now);
+    if (this.frozen) return;
+    this.cards.draw();
+    this.redrawPlots();
   }
 
   togglePause() {
@@ -167,24 +150,22 @@ class Page {
     button.setAttribute("aria-pressed", String(paused));
     setText(button, paused ? "Resume" : "Pause");
     byId("paused").hidden = !paused;
-    document.body.classList.toggle("is-paused", paused);
     this.cards.setFrozen(paused);
     this.dirty = true;
   }
 
   setWindow(seconds) {
-    this.plots.window = seconds;
-    if (this.store) this.plots.build();
+    if (!this.store) return;
     setPressed(byId("windows"), seconds);
+    this.plots.show(this.plots.chosen, seconds);
     this.redrawPlots();
   }
 
   chooseFinger(name) {
     if (!this.store || name === this.plots.chosen) return;
-    this.plots.chosen = name;
     setPressed(byId("fingers"), name ?? "");
     this.cards.choose(name);
-    this.plots.build();
+    this.plots.show(name, this.plots.window);
     this.redrawPlots();
   }
 
@@ -205,15 +186,14 @@ class Page {
   addMarker(text) {
     if (!Number.isFinite(this.now)) return;
     this.plots.addMarker(this.now);
-    this.events.addMarker(this.now, text);
+    this.events.addEvent("marker", text);
   }
 
   showStream(hello) {
-    const modules = Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", ");
-    const sensors = [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", ");
     const rows = {
-      model: hello.model, source: hello.source, sensors, rate: hello.rate ? `${hello.rate} Hz` : "not known",
-      "modules (taxels)": modules, since: new Date(1000 * hello.started).toLocaleString("en-GB"),
+      model: hello.model, source: hello.source, rate: hello.rate ? `${hello.rate} Hz` : "not known",
+      sensors: [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", "),
+      "modules (taxels)": Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", "),
     };
     byId("stream").replaceChildren(...Object.entries(rows).flatMap(([name, value]) => [make("dt", "", name), make("dd", "", String(value))]));
   }

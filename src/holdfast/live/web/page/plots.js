@@ -47,8 +47,7 @@ export class Plots {
     Object.assign(this, { fingers: hello.fingers, names: Object.keys(hello.fingers), store });
     this.markers = []; // times [s]
     this.thresholds = {}; // of the live detector, by finger
-    if (!this.names.includes(this.chosen)) this.chosen = null;
-    this.build();
+    this.show(this.names.includes(this.chosen) ? this.chosen : null, this.window);
   }
 
   addMarker(time) { this.markers = [...this.markers, time].slice(-MAX_MARKERS); }
@@ -56,8 +55,9 @@ export class Plots {
   // Names of the fingers in the plots.
   get shown() { return this.chosen === null ? this.names : [this.chosen]; }
 
-  /** Create the plots for the chosen finger and window. */
-  build() {
+  /** Create the plots of a finger, null for all, over a window [s]. */
+  show(chosen, window) {
+    Object.assign(this, { chosen, window });
     for (const row of this.rows) {
       row.plot.destroy();
       row.box.remove();
