@@ -128,8 +128,7 @@ class Card {
   }
 
   update(finger, frozen) {
-    const note = debounceNote(finger, this.threshold, this.hello.debounce);
-    this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
+    this.showState(finger.state, debounceNote(finger, this.threshold, this.hello.debounce) || reasonWord(finger.reason));
     this.showSlip(hasSlipRule(this.sensor) && finger.cause === "slip" ? finger : null);
     const probability = shownProbability(finger.state, finger.stable_probability);
     setText(this.probability, percent(probability));
@@ -142,11 +141,10 @@ class Card {
     if (!frozen) this.map.update(finger.taxels, finger.faulty_taxels ?? []);
   }
 
-  showState(state, reason, longReason = reason) {
+  showState(state, reason) {
     const key = stateKey(state);
     setText(this.word, stateWord(state));
     setText(this.reason, reason);
-    this.reason.title = longReason;
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
     setShape(this.shape, key);

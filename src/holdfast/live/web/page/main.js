@@ -71,9 +71,7 @@ class Page {
     this.events.clear();
     for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
     this.plots.start(hello, this.store);
-    const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
-    document.body.classList.toggle("has-slips", hasSlips);
-    byId("slip-help").hidden = !hasSlips;
+    document.body.classList.toggle("has-slips", Object.values(hello.fingers).some(hasSlipRule));
     this.fillFingers();
     this.showStream(hello);
     for (const text of (hello.advice ?? []).filter((advice) => !this.advised.has(advice))) {
