@@ -18,10 +18,15 @@ export class Commands {
 
   listen() {
     listenToKeys(this.keys());
-    for (const button of document.querySelectorAll("[data-command]")) button.addEventListener("click", () => this[button.dataset.command]());
-    byId("force").addEventListener("change", (event) => this.rows.showForce(event.target.value));
-    byId("note").addEventListener("input", (event) => this.editor.setNote(event.target.value));
-    byId("propose").addEventListener("click", (event) => runOnce(event.target, () => this.propose()));
+    const on = (id, name, act) => byId(id).addEventListener(name, act);
+    on("previous-recording", "click", () => this.openNeighbour(-1));
+    on("next-recording", "click", () => this.openNeighbour(1));
+    on("force", "change", (event) => this.rows.showForce(event.target.value));
+    on("note", "input", (event) => this.editor.setNote(event.target.value));
+    on("propose", "click", (event) => runOnce(event.target, () => this.propose()));
+    on("accept-all", "click", () => this.acceptAll());
+    on("next-item", "click", () => this.nextReviewItem());
+    on("toggle-side", "click", () => this.toggleSidePanel());
   }
 
   /** Return the keys of the page, for `listenToKeys`. */
@@ -52,7 +57,7 @@ export class Commands {
         ["double click, 0", "show the whole recording", { 0: all, Home: all }],
         ["+ − ← →", "zoom and move", { "+": closer, "=": closer, "-": () => this.zoom(1 / 0.6), ArrowLeft: () => this.pan(-0.2), ArrowRight: () => this.pan(0.2) }],
         ["Space", "play or pause", { " ": () => this.player.toggle() }],
-        ["N P", "open the next or the previous recording", { n: () => this.openNext(), p: () => this.openPrevious() }],
+        ["N P", "open the next or the previous recording", { n: () => this.openNeighbour(1), p: () => this.openNeighbour(-1) }],
         ["F", "show |F|, Fx, Fy, Fz, or all three components", { f: () => this.nextForce() }],
         ["Y", "fit the vertical axes to the whole recording or to the visible window", { y: () => this.toggleScaling() }],
         ["B", "hide or show the side panel", { b: () => this.toggleSidePanel() }],
@@ -148,13 +153,11 @@ export class Commands {
     showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
   }
 
-  openNext() { this.openNeighbour(1, "This is the last recording"); }
-  openPrevious() { this.openNeighbour(-1, "This is the first recording"); }
-
-  openNeighbour(step, problem) {
+  /** Open the previous (-1) or the next (1) recording. */
+  openNeighbour(step) {
     const entry = this.recordings.neighbour(this.page.id, step);
     if (entry) this.page.open(entry.id);
-    else showToast(problem, "good");
+    else showToast(step > 0 ? "This is the last recording" : "This is the first recording", "good");
   }
 
   /** Cancel a drag; without a drag, clear the selection. */

@@ -36,7 +36,7 @@ class LabellingPage {
     this.reviewList = new ReviewList(this.editor, (item) => this.commands.showReviewItem(item));
     this.player = new Player((time) => this.playTimeChanged(time));
     this.commands = new Commands(this);
-    this.toolbar = new Toolbar(this.editor, (kind) => this.commands.setKind(kind));
+    this.toolbar = new Toolbar(this.editor, (command, ...args) => this.commands[command](...args));
     this.pointer = new Pointer(byId("surface"), this.rows, (time) => this.player.seek(time), () => this.showStatus());
     this.commands.listen();
     byId("save").addEventListener("click", () => (this.saver.stopped ? resolveConflict(this) : this.saver.flush()));

@@ -37,12 +37,16 @@ export class Cards {
   }
 
   update(message) {
-    if (!this.frozen) for (const { disc, arrow } of this.scales.values()) for (const scale of [disc, arrow]) scale.decay(message.time);
+    if (!this.frozen) this.decayScales(message.time);
     for (const [name, card] of this.cards) {
       const finger = message.fingers[name];
       card.setThreshold(message.thresholds?.[name]);
       if (finger) card.update(finger, this.frozen);
     }
+  }
+
+  decayScales(now) {
+    for (const { disc, arrow } of this.scales.values()) for (const scale of [disc, arrow]) scale.decay(now);
   }
 
   /** Show all fingers as UNKNOWN: an old STABLE must not look like a current one. */

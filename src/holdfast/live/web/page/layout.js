@@ -103,3 +103,18 @@ export function toMapFrame(reading, rotation, right, up) {
   const tangent = [0, 1, 2].map((k) => rotation[k][0] * reading[0] + rotation[k][1] * reading[1]);
   return [dot(tangent, right), dot(tangent, up), reading[2]];
 }
+
+/** Return the convex hull of the points, counter-clockwise: the outline of the sensor. */
+export function hull(points) {
+  const sorted = [...points].sort((a, b) => a[0] - b[0] || a[1] - b[1]);
+  const turn = (o, a, b) => (a[0] - o[0]) * (b[1] - o[1]) - (a[1] - o[1]) * (b[0] - o[0]);
+  const half = (points) => {
+    const chain = [];
+    for (const point of points) {
+      while (chain.length > 1 && turn(chain.at(-2), chain.at(-1), point) <= 0) chain.pop();
+      chain.push(point);
+    }
+    return chain.slice(0, -1);
+  };
+  return sorted.length < 3 ? sorted : [...half(sorted), ...half(sorted.reverse())];
+}

@@ -2,7 +2,7 @@
 
 import { number, unitWord } from "../web/text.js";
 import { colours, font, lightTheme } from "../web/theme.js";
-import { layout, toMapFrame } from "./layout.js";
+import { hull, layout, toMapFrame } from "./layout.js";
 
 const FONT = font(11);
 // Minimum full scale by unit: smaller readings are noise.
@@ -57,6 +57,7 @@ export class TaxelMap {
   /** @param scales {disc, arrow}: shears have their own scale, because they are smaller. */
   constructor(canvas, sensor, scales) {
     Object.assign(this, { canvas, sensor, scales, layout: layout(sensor.positions, sensor.rotations, sensor.normal) });
+    this.hull = hull(this.layout.points);
     this.values = null; // readings in the frame of the map; null if there are none
     this.faulty = new Set();
     this.size = [0, 0];
@@ -107,18 +108,21 @@ export class TaxelMap {
     context.clearRect(0, 0, width, height);
     context.lineJoin = context.lineCap = "round";
     const { at, radius } = this.toPixels(), points = this.layout.points.map(at);
-    this.drawOutline(context, points, radius);
+    this.drawOutline(context, this.hull.map(at), radius);
     points.forEach((point, k) => this.drawDisc(context, point, k, radius));
     if (this.values) points.forEach((point, k) => this.drawArrow(context, point, k, radius));
     this.drawLabel(context, width, height);
   }
 
-  // Large discs around all taxels, and smaller ones on top, give the outline of the skin.
-  drawOutline(context, points, radius) {
-    for (const [colour, r] of [[colours.outline, 2 * radius + 1.5], [colours.base, 2 * radius]]) {
-      context.fillStyle = colour;
-      context.beginPath();
-      for (const [x, y] of points) { context.moveTo(x, y); context.arc(x, y, r, 0, 2 * Math.PI); }
+  // A wide line with round corners around the hull, and a narrower one on top, give an outline.
+  drawOutline(context, corners, radius) {
+    context.beginPath();
+    line(context, ...corners);
+    context.closePath();
+    for (const [colour, lineWidth] of [[colours.outline, 3 * radius], [colours.base, 3 * radius - 3]]) {
+      context.lineWidth = Math.max(1, lineWidth);
+      context.strokeStyle = context.fillStyle = colour;
+      context.stroke();
       context.fill();
     }
   }
