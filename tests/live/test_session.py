@@ -49,6 +49,19 @@ def test_listeners_receive_all_updates_in_order(start):
     assert session.failure is None
 
 
+def test_a_slow_reader_misses_the_oldest_updates(start, monkeypatch):
+    monkeypatch.setattr("holdfast.live.session.MAX_KEPT_UPDATES", 20)
+    updates = []
+    session = start(build.Script.of(build.grasp()), updates.append)
+    wait_for(lambda: session.ended)
+    n = session.n_updates
+    assert n == len(updates) > 40
+    for n_read, n_missed in ((0, n - 20), (n - 30, 10), (n - 5, 0), (n, 0)):
+        kept, end = session.updates_since(n_read)
+        assert [update for _, update in kept] == updates[n_read + n_missed :]
+        assert end == n
+
+
 def test_the_module_with_most_samples_gives_the_number_of_packets(start):
     recording = build.grasp()
     steps = [

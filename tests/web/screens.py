@@ -4,7 +4,7 @@ PHONE, TABLET, DESKTOP = (390, 844), (768, 1024), (1440, 900)
 SCREENS = [PHONE, (700, 900), TABLET, DESKTOP]
 
 # Blocks that draw on purpose over each other, and what lies over the page for a short time.
-BLOCKS = ".holder, .layers, .map, .bar:not(.plots > .bar), .overview"
+BLOCKS = ".holder, .rows, .map, .bar:not(.plots > .bar), .overview"
 IGNORED = ".toasts, .toasts *, .spoken, .symbols *, dialog, dialog *, option, svg, svg *, .paused"
 TEXTS = "button, select, h1, h2, h3, label, output, .word, .values *, .entry, .alert"
 

@@ -18,6 +18,8 @@ from holdfast.errors import SourceError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 Work = Callable[[], None]
+MAX_KEPT_UPDATES = 1024
+"""Number of newest updates that are kept for readers: 6.8 s at 150 Hz."""
 MAX_LATENCIES = 8192
 """Number of newest latencies from which the percentiles are computed: 55 s at 150 Hz."""
 SWITCH_INTERVAL = 5e-4
@@ -126,11 +128,19 @@ class Latency(NamedTuple):
 Listener = Callable[[StreamUpdate], None]
 
 
+class TimedUpdate(NamedTuple):
+    """Update of the stream, and the host's time at which it was made [s since 1970]."""
+
+    time: float
+    update: StreamUpdate
+
+
 class Session:
     """Run a stream detector in its own thread. Leaving it as a context manager stops it.
 
-    Listeners are called in that thread, one after the other. They must return at once: they
-    put the update into a queue, and other threads process it.
+    It keeps the newest updates, which other threads read at their own pace: a reader that is too
+    slow misses some, and delays nobody. Listeners are called in the thread of the session, one
+    after the other. They must return at once.
 
     Args:
         stream: detector of an open source.
@@ -142,6 +152,7 @@ class Session:
             because one packet may hold the samples of several instants, each of another module.
         n_lost: packets that are missing by the device's own count.
         n_refused: packets that could not be decoded.
+        n_updates: updates of the stream so far.
         delay: delay of the newest sample relative to the quickest one of the source [s].
         ended: True if the source has ended, or the detector has failed.
         failure: the exception that ended the session.
@@ -150,7 +161,7 @@ class Session:
     def __init__(self, stream: StreamDetector) -> None:
         self.stream = stream
         self.source = stream.source
-        self.n_packets = self.n_lost = self.n_refused = 0
+        self.n_packets = self.n_lost = self.n_refused = self.n_updates = 0
         self.delay = 0.0
         self.ended = False
         self.failure: Exception | None = None
@@ -164,6 +175,8 @@ class Session:
         self._thread = Thread(target=self._run, name="holdfast-detector", daemon=True)
         # A ring that the session's thread writes: a copy of it may mix two laps, which are alike.
         self._latencies = np.full(MAX_LATENCIES, np.nan)
+        # The same: an update is written before it is counted.
+        self._updates: list[TimedUpdate | None] = [None] * MAX_KEPT_UPDATES
         self._n_latencies = 0
 
     def add_listener(self, listener: Listener) -> None:
@@ -173,6 +186,16 @@ class Session:
     def remove_listener(self, listener: Listener) -> None:
         """Stop calling `listener`."""
         self._listeners = [other for other in self._listeners if other != listener]
+
+    def updates_since(self, n_read: int) -> tuple[list[TimedUpdate], int]:
+        """Return the updates after the first `n_read`, as far as they are kept, and their number.
+
+        The number is that of all updates so far: that of the next call.
+        """
+        end = self.n_updates
+        first = max(n_read, end - MAX_KEPT_UPDATES)
+        kept = (self._updates[number % MAX_KEPT_UPDATES] for number in range(first, end))
+        return [update for update in kept if update is not None], end
 
     def start(self) -> None:
         """Start to read the source."""
@@ -259,6 +282,8 @@ class Session:
             self._notify(update)
 
     def _notify(self, update: StreamUpdate) -> None:
+        self._updates[self.n_updates % MAX_KEPT_UPDATES] = TimedUpdate(time.time(), update)
+        self.n_updates += 1
         for listener in self._listeners:
             listener(update)
 

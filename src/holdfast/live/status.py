@@ -1,4 +1,4 @@
-"""Collect the updates of a session, and publish them as documents of the web service."""
+"""Publish the updates of a session as documents of the web service."""
 
 import time
 from collections import deque
@@ -18,8 +18,8 @@ from holdfast.live.stream_detector import StreamEstimate, StreamUpdate
 from holdfast.live.web import schema
 from holdfast.sensors.types import Array
 
-MAX_BUFFERED_UPDATES = 4096
-"""Maximum number of updates between two documents; older ones are dropped."""
+MAX_OWN_NOTICES = 4096
+"""Maximum number of notices of the service between two documents; older ones are dropped."""
 RATE_PERIOD = 1.0
 """Period over which the packet rate is measured [s]."""
 
@@ -27,10 +27,7 @@ _NO_FORCE = (np.nan, np.nan, np.nan)
 
 
 class StatusPublisher:
-    """Collect the updates of a session until the next document is made.
-
-    The session's thread calls `put`, the service's thread `live_document`. A queue of bounded
-    length connects them.
+    """Make documents of the updates of a session, in the thread of the service.
 
     Args:
         session: to publish.
@@ -42,17 +39,13 @@ class StatusPublisher:
         self._report = report
         self._faults = FaultWatch()
         self._slips = SlipWatch()
-        self._updates: deque[tuple[float, StreamUpdate]] = deque(maxlen=MAX_BUFFERED_UPDATES)
-        self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_BUFFERED_UPDATES)
-        # The next three are kept from document to document, by the service's thread alone: the
-        # newest estimate and readings for documents without any, and the counts of the rate.
+        self._n_read = session.n_updates  # updates of the documents so far
+        self._own_notices: deque[schema.Notice] = deque(maxlen=MAX_OWN_NOTICES)
+        # Kept from document to document: the newest estimate and readings for documents without
+        # any, and the counts of the rate.
         self._newest: HandEstimate | None = None
         self._taxels: dict[str, list[Vector]] = {}
         self._counts: deque[tuple[float, int]] = deque([(time.monotonic(), 0)])
-
-    def put(self, update: StreamUpdate) -> None:
-        """Append an update; a listener of the session."""
-        self._updates.append((time.time(), update))
 
     def add_notice(self, text: str) -> None:
         """Add a notice of the service itself, in the service's thread."""
@@ -61,8 +54,8 @@ class StatusPublisher:
 
     def live_document(self, recorder: Recorder | None) -> schema.LiveDocument:
         """Return everything since the last call as one document."""
-        # The session's thread goes on appending: only what is there now belongs to this document.
-        updates = [self._updates.popleft() for _ in range(len(self._updates))]
+        # The session's thread goes on: only what is there now belongs to this document.
+        updates, self._n_read = self._session.updates_since(self._n_read)
         estimates = [estimate for _, update in updates for estimate in update.estimates]
         for estimate, _ in estimates:
             for problem in self._faults.update(estimate):

@@ -3,17 +3,16 @@
 from browser import DESKTOP, shows, until
 
 POSITION = """([finger, time, zone]) => {
-  const { plot, view, editor } = holdfast, row = plot.rows[editor.fingers.indexOf(finger)];
-  const box = document.querySelector("#cursor-canvas").getBoundingClientRect();
-  const [top, bottom] = row[zone];
-  return [box.left + view.x(time), box.top + (top + bottom) / 2];
+  const { rows, view } = holdfast, part = rows.rows.find((row) => row.finger === finger).parts[zone];
+  const { top, height } = part.getBoundingClientRect();
+  return [document.querySelector("#surface").getBoundingClientRect().left + view.x(time), top + height / 2];
 }"""
 
 
 def ready(page):
     """Wait until the signals are drawn and the change points are loaded."""
     until(page, "document.body.dataset.painted === '1'")
-    until(page, "Object.keys(holdfast.plot.changePoints).length > 0")
+    until(page, "Object.keys(holdfast.rows.changePoints).length > 0")
 
 
 def opened(visit, service, size=DESKTOP, **options):

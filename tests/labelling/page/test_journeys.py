@@ -53,7 +53,7 @@ def test_draw_and_zoom_with_the_fingers_on_a_phone(visit, service):
         touches = [{"x": x, "y": y, "id": k} for k, (x, y) in enumerate(points)]
         touch.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
 
-    page.locator("#cursor-canvas").scroll_into_view_if_needed()
+    page.locator("#surface").scroll_into_view_if_needed()
     page.touchscreen.tap(*position(page, "thumb", 10))
     assert labels(page) == []
     for kind, time in (("touchStart", 8), ("touchMove", 12), ("touchMove", 16)):
@@ -264,7 +264,7 @@ def test_look_at_a_long_recording(visit):
             page.mouse.wheel(0, -300)
         shows(page, "#window", "every sample")
         start, end = page.evaluate(SPAN)
-        times = page.evaluate(f"[...holdfast.signals.segments('index', ...{SPAN})[0][0].t]")
+        times = page.evaluate("holdfast.signals.columns('index').t")
         signals = service.recordings[0].signals.fingers["index"]
         own = signals.times
         shown = own[(own >= start) & (own <= end)].tolist()
@@ -272,7 +272,7 @@ def test_look_at_a_long_recording(visit):
         k = int(np.searchsorted(own, start)) + 2
         point(page, "index", float(own[k]))  # the values at the cursor
         value = f"^{signals.values[k, 0]:.0f}$"
-        shows(page, ".finger-legend:nth-child(2) .value", value)
+        shows(page, ".finger-row:nth-child(3) .value", value)
         page.select_option("#force", "xyz")
         shows(page, ".finger-legend", r"Fx[\s\S]*Fy[\s\S]*Fz[\s\S]*σ")
         page.keyboard.press("0")
@@ -292,7 +292,7 @@ def test_look_at_a_long_recording(visit):
         page.keyboard.press("+")
         page.evaluate("holdfast.view.pan(1000)")
         assert page.evaluate("holdfast.view.end") == service.recordings[0].end
-        box = page.locator("#overview-canvas").bounding_box()
+        box = page.locator("#overview").bounding_box()
         page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 25)  # the overview moves it
         assert page.evaluate(SPAN) == pytest.approx([61, 71], abs=3)
         until(page, loaded)

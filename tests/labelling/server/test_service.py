@@ -318,7 +318,12 @@ def test_videos_beside_the_recording_and_nothing_else(tmp_path):
 
 @pytest.mark.parametrize(
     ("path", "exists"),
-    [("/", True), ("/page/main.js", True), ("/web/base.css", True), ("/page/../service.py", False)],
+    [
+        ("/", True),
+        ("/page/main.js", True),
+        ("/web/style.css", True),
+        ("/page/../service.py", False),
+    ],
 )
 def test_the_files_of_the_page_and_no_others(tmp_path, path, exists):
     async def work():

@@ -17,7 +17,6 @@ from holdfast.live.web import schema
 from holdfast.live.web.service import (
     MAX_WEBSOCKETS_PER_ADDRESS,
     LiveService,
-    WebSocketClient,
 )
 from holdfast.metrics.masks import runs
 from holdfast.web.guard import Guard
@@ -221,13 +220,6 @@ def test_clients_that_do_not_read_delay_no_other():
     assert latency.p50 < 1.0  # an estimate does not wait for a socket
 
 
-def test_the_queue_of_a_client_keeps_the_newest_documents():
-    client = WebSocketClient(None, 3)
-    for k in range(10):
-        client.put(str(k))
-    assert [client._queue.get_nowait() for _ in range(client._queue.qsize())] == ["7", "8", "9"]
-
-
 @pytest.mark.parametrize(("n", "status"), [(60, 200), (600, 409)], ids=["open", "contact"])
 def test_the_tare_is_refused_in_contact(n, status):
     async def conversation(client, session, socket, hello):
@@ -419,7 +411,7 @@ def test_too_many_websockets_are_refused(monkeypatch, limit, n):
 
 def test_the_page_loads_nothing_from_other_servers():
     async def conversation(client, session, socket, hello):
-        for path in ("/page/main.js", "/page/uplot/uPlot.iife.min.js", "/web/base.css"):
+        for path in ("/page/main.js", "/web/uplot/uPlot.iife.min.js", "/web/style.css"):
             async with client.get(path) as answer:
                 assert answer.status == 200
         async with client.get("/") as answer:

@@ -1,10 +1,10 @@
 // Commands that keys and buttons run.
 
-import { callService } from "../web/api.js";
-import { byId } from "../web/dom.js";
-import { countOf } from "./format.js";
-import { keyBindings, listenToKeys } from "./keyboard.js";
-import { showToast } from "./status.js";
+import { callService } from "../web/connection.js";
+import { byId, runOnce, showToast } from "../web/dom.js";
+import { listenToKeys } from "../web/help.js";
+import { percent } from "../web/text.js";
+import { CAUSES, causeKey, countOf, STATES } from "./format.js";
 
 const FORCES = ["F_a", "F_x", "F_y", "F_z", "xyz"];
 const READ_ONLY = "This recording is read-only";
@@ -12,22 +12,57 @@ const READ_ONLY = "This recording is read-only";
 export class Commands {
   constructor(page) {
     this.page = page;
-    page.plot.target = () => this.target();
-    for (const part of ["editor", "view", "plot", "player", "saver", "recordings"]) this[part] = page[part];
+    page.rows.target = () => this.target();
+    for (const part of ["editor", "view", "rows", "player", "saver", "recordings"]) this[part] = page[part];
   }
 
   listen() {
-    listenToKeys(keyBindings(this));
+    listenToKeys(this.keys());
     const on = (id, name, act) => byId(id).addEventListener(name, act);
     on("previous-recording", "click", () => this.openNeighbour(-1));
     on("next-recording", "click", () => this.openNeighbour(1));
-    on("force", "change", (event) => this.plot.showForce(event.target.value));
+    on("force", "change", (event) => this.rows.showForce(event.target.value));
     on("note", "input", (event) => this.editor.setNote(event.target.value));
-    on("help", "click", () => this.showHelp());
-    on("propose", "click", () => this.propose());
+    on("propose", "click", (event) => runOnce(event.target, () => this.propose()));
     on("accept-all", "click", () => this.acceptAll());
     on("next-item", "click", () => this.nextReviewItem());
     on("toggle-side", "click", () => this.toggleSidePanel());
+  }
+
+  /** Return the keys of the page, for `listenToKeys`. */
+  keys() {
+    const states = Object.fromEntries(STATES.map((state, k) => [k + 1, () => this.setKind({ state })]));
+    const causes = Object.fromEntries(CAUSES.map((cause) => [causeKey(cause), () => this.setKind({ cause })]));
+    const closer = () => this.zoom(0.6), all = () => this.view.showAll();
+    return {
+      Label: [
+        ["1 2 3", "set the state: stable, unstable, no contact (of the selected label, or else of the next label)", states],
+        ["C D S L R K", "set the cause: closing, disturbance, slip, lost, released, glitch", causes],
+        ["drag", "draw a label on a finger; with Ctrl on all fingers"],
+        ["drag an edge", "move the edge; it snaps to change points, except with Alt"],
+        ["click", "select a label, and move the playback time"],
+        ["A", "copy the label to all fingers", { a: () => this.copy() }],
+        ["Delete", "delete the label", { Delete: () => this.remove(), Backspace: () => this.remove() }],
+        ["Esc", "cancel a drag, or clear the selection", { Escape: () => this.cancel() }],
+        ["Ctrl Z", "undo; with Shift redo", { "Control-z": () => this.undo(), "Control-Shift-z": () => this.redo(), "Control-y": () => this.redo() }],
+        ["E", "edit the note about the recording", { e: () => this.editNote(), "Control-s": () => this.saver.flush() }],
+        ["Enter", "accept the proposal under the pointer, or the next one; confirm a label of low confidence", { Enter: () => this.accept() }],
+        ["X", "reject the proposal", { x: () => this.reject() }],
+        ["Shift Enter", "accept all proposals of high confidence", { "Shift-Enter": () => this.acceptAll() }],
+        ["G", "go to the next item to review", { g: () => this.nextReviewItem() }],
+      ],
+      View: [
+        ["wheel", "zoom about the pointer"],
+        ["Shift or right drag", "move the time window"],
+        ["double click, 0", "show the whole recording", { 0: all, Home: all }],
+        ["+ − ← →", "zoom and move", { "+": closer, "=": closer, "-": () => this.zoom(1 / 0.6), ArrowLeft: () => this.pan(-0.2), ArrowRight: () => this.pan(0.2) }],
+        ["Space", "play or pause", { " ": () => this.player.toggle() }],
+        ["N P", "open the next or the previous recording", { n: () => this.openNeighbour(1), p: () => this.openNeighbour(-1) }],
+        ["F", "show |F|, Fx, Fy, Fz, or all three components", { f: () => this.nextForce() }],
+        ["Y", "fit the vertical axes to the whole recording or to the visible window", { y: () => this.toggleScaling() }],
+        ["B", "hide or show the side panel", { b: () => this.toggleSidePanel() }],
+      ],
+    };
   }
 
   setKind(fields) { this.editor.setKind(fields); }
@@ -36,8 +71,7 @@ export class Commands {
   remove() { this.editor.remove(); }
 
   copy() {
-    if (this.editor.copy()) return;
-    showToast(this.editor.readOnly ? READ_ONLY : "Draw or select a label first: A copies it to all fingers", "bad");
+    if (!this.editor.copy()) showToast(this.editor.readOnly ? READ_ONLY : "Draw or select a label first: A copies it to all fingers", "bad");
   }
 
   /**
@@ -45,17 +79,12 @@ export class Commands {
    * label of low confidence, else the item in focus, else the next proposal; null if none is left.
    */
   target() {
-    const { editor } = this, { hoveredProposal } = this.plot;
-    if (hoveredProposal && editor.proposals.some(({ item }) => item === hoveredProposal.item)) {
-      return { kind: "proposal", ...hoveredProposal };
-    }
-    const { chosen, focus } = editor;
-    if (chosen && chosen.label.confidence < 1 && editor.reviewItems.some(({ item }) => item === chosen.label)) {
-      return { kind: "label", finger: chosen.finger, item: chosen.label };
-    }
-    const isFocus = (each) => each.item === focus?.item;
-    if (focus && (editor.reviewItems.some(isFocus) || editor.proposals.some(isFocus))) return focus;
-    return editor.proposals.length ? { kind: "proposal", ...editor.proposals[0] } : null;
+    const { proposals, reviewItems, chosen, focus } = this.editor;
+    const proposalOf = (item) => proposals.find((each) => each.item === item), review = (item) => reviewItems.find((each) => each.item === item);
+    const proposal = proposalOf(this.rows.hoveredProposal?.item);
+    if (proposal) return { kind: "proposal", ...proposal };
+    const doubtful = review(chosen?.label) ?? (focus && (review(focus.item) || proposalOf(focus.item)) && focus);
+    return doubtful || (proposals.length ? { kind: "proposal", ...proposals[0] } : null);
   }
 
   accept() { this.decide((target) => this.editor.accept(target)); }
@@ -64,19 +93,19 @@ export class Commands {
   // Run `act` on the target. A target outside the window is only shown first.
   decide(act) {
     const target = this.target();
-    if (!target) { showToast("No proposal is open", "good"); return; }
-    if (this.editor.readOnly) { showToast(READ_ONLY, "bad"); return; }
-    const hovered = this.plot.hoveredProposal?.item === target.item;
+    if (!target) return showToast("No proposal is open", "good");
+    if (this.editor.readOnly) return showToast(READ_ONLY, "bad");
+    const hovered = this.rows.hoveredProposal?.item === target.item;
     if (!this.view.contains(target.item) && !hovered) {
       this.view.reveal(target.item);
-      this.editor.setFocus(target);
-      return;
+      return this.editor.setFocus(target);
     }
     const next = this.itemAfter(target);
     act(target);
-    this.plot.hoveredProposal = null;
+    this.rows.hoveredProposal = null;
     this.editor.setFocus(next);
     if (next && !hovered && !this.view.contains(next.item)) this.view.reveal(next.item);
+    return undefined;
   }
 
   // Return the next review item if the target comes from the review list, else the next proposal in time.
@@ -85,16 +114,15 @@ export class Commands {
     if (target.kind !== "proposal" || editor.lastReviewed?.item === target.item) {
       return editor.reviewItems.find(({ item }) => item !== target.item) ?? null;
     }
-    const index = editor.proposals.findIndex(({ item }) => item === target.item);
-    const next = editor.proposals[index + 1] ?? editor.proposals.find(({ item }) => item !== target.item);
+    const { proposals } = editor, index = proposals.findIndex(({ item }) => item === target.item);
+    const next = proposals[index + 1] ?? proposals[index && 0];
     return next ? { kind: "proposal", ...next } : null;
   }
 
   acceptAll() {
     const minConfidence = Math.max(0, Math.min(1, byId("min-confidence").valueAsNumber / 100 || 0));
-    const n = this.editor.acceptAll(minConfidence), limit = `${Math.round(100 * minConfidence)} %`;
-    if (n) showToast(`${countOf(n, "proposal")} with a confidence of at least ${limit} accepted`, "good");
-    else showToast(`No open proposal has a confidence of at least ${limit}`, "bad");
+    const n = this.editor.acceptAll(minConfidence);
+    showToast(`${countOf(n, "proposal")} with a confidence of at least ${percent(minConfidence)} accepted`, n ? "good" : "bad");
   }
 
   nextReviewItem() {
@@ -106,7 +134,7 @@ export class Commands {
   showReviewItem(reviewItem) {
     const { editor } = this, { kind, finger, item } = reviewItem;
     editor.lastReviewed = reviewItem;
-    this.plot.hoveredProposal = null;
+    this.rows.hoveredProposal = null;
     this.view.reveal(item);
     editor.select(finger, kind === "label" ? item : null);
     editor.setFocus(reviewItem);
@@ -114,24 +142,15 @@ export class Commands {
   }
 
   async propose() {
-    const { id, generation, editor } = this.page, button = byId("propose");
-    if (button.classList.contains("busy")) return;
-    button.classList.add("busy");
-    try {
-      const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
-      if (generation !== this.page.generation) return;
-      editor.recording.proposals = proposals;
-      // A new request shows all proposals again, also those that were rejected.
-      if (editor.state.rejected.size) editor.apply({ rejected: new Set() });
-      editor.focus = null;
-      this.page.editorChanged(false);
-      this.page.updateCounts();
-      showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
-    } catch (error) {
-      showToast(error.message, "bad");
-    } finally {
-      button.classList.remove("busy");
-    }
+    const { id, generation, editor } = this.page;
+    const { proposals } = await callService("POST", `recordings/${id}/propose`, { rule: byId("rule").value, parameters: {} });
+    if (generation !== this.page.generation) return;
+    editor.recording.proposals = proposals;
+    // A new request shows all proposals again, also those that were rejected.
+    if (editor.state.rejected.size) editor.apply({ rejected: new Set() });
+    editor.setFocus(null);
+    this.page.updateCounts();
+    showToast(`${countOf(Object.values(proposals).flat().length, "proposal")}: Enter accepts one, Shift-Enter accepts all of high confidence`, "good");
   }
 
   /** Open the previous (-1) or the next (1) recording. */
@@ -149,27 +168,25 @@ export class Commands {
   }
 
   nextForce() {
-    const force = FORCES[(FORCES.indexOf(this.plot.force) + 1) % FORCES.length];
+    const force = FORCES[(FORCES.indexOf(this.rows.force) + 1) % FORCES.length];
     byId("force").value = force;
-    this.plot.showForce(force);
+    this.rows.showForce(force);
   }
 
   toggleScaling() {
-    this.plot.scaleToWindow = !this.plot.scaleToWindow;
-    this.plot.scales = null;
-    this.plot.redraw("signals");
-    showToast(this.plot.scaleToWindow ? "Vertical axes fit the visible window" : "Vertical axes fit the whole recording", "good");
+    this.rows.scaleToWindow = !this.rows.scaleToWindow;
+    this.rows.redraw("signals");
+    showToast(this.rows.scaleToWindow ? "Vertical axes fit the visible window" : "Vertical axes fit the whole recording", "good");
   }
 
   /** Zoom about the cursor, or about the middle of the window if there is no cursor. */
   zoom(factor) {
     const { start, end } = this.view;
-    this.view.zoom(factor, this.plot.hover?.time ?? (start + end) / 2);
+    this.view.zoom(factor, this.rows.hover?.time ?? (start + end) / 2);
   }
 
   pan(fraction) { this.view.pan(fraction * this.view.span); }
   toggleSidePanel() { byId("toggle-side").setAttribute("aria-pressed", String(document.body.classList.toggle("is-side-hidden"))); }
-  showHelp() { byId("help-box").showModal(); }
 
   editNote() {
     document.body.classList.remove("is-side-hidden");

@@ -2,10 +2,9 @@
 // save them, or of another program that saved first. The labels that are not chosen stay in the
 // undo history.
 
-import { callService } from "../web/api.js";
-import { byId, make } from "../web/dom.js";
+import { callService } from "../web/connection.js";
+import { byId, make, makeButton, showToast } from "../web/dom.js";
 import { countOf, dateText } from "./format.js";
-import { showToast } from "./status.js";
 
 const countLabels = (labels) => countOf(Object.values(labels).flat().length, "label");
 
@@ -21,19 +20,15 @@ function showQuestion(title, texts, buttons) {
   const dialog = byId("question");
   return new Promise((resolve) => {
     const row = make("div", "answers", ...buttons.map(({ value, label }) => {
-      const button = make("button", "", label);
-      button.type = "button";
+      const button = makeButton("", () => { dialog.close(); resolve(value); }, label);
       button.dataset.value = value;
-      button.addEventListener("click", () => { dialog.close(); resolve(value); });
       return button;
     }));
     const heading = make("h2", "", title);
-    heading.id = "question-title";
     heading.tabIndex = -1;
     dialog.replaceChildren(heading, ...texts.map((text) => make("p", "", text)), row);
     // Escape must not close the dialog without a decision.
-    dialog.oncancel = (event) => event.preventDefault();
-    dialog.onkeydown = (event) => { if (event.key === "Escape") event.preventDefault(); };
+    dialog.onkeydown = (event) => event.key === "Escape" && event.preventDefault();
     dialog.showModal();
     // The heading gets the focus: Enter, pressed for a proposal, must not answer the question.
     heading.focus();
@@ -56,14 +51,8 @@ export async function offerUnsavedLabels({ editor, saver }, recording, unsaved) 
 /** Ask which labels to keep after another page or program has saved the file; then go on saving. */
 export async function resolveConflict(page) {
   const { id, generation, editor, saver } = page;
-  let file;
-  try {
-    file = await callService("GET", `recordings/${id}`);
-  } catch (error) {
-    showToast(error.message, "bad");
-    return;
-  }
-  if (generation !== page.generation) return;
+  const file = await callService("GET", `recordings/${id}`).catch((error) => showToast(error.message, "bad"));
+  if (!file || generation !== page.generation) return;
   const by = [file.author && ` by ${file.author}`, file.time && `, ${dateText(file.time)}`].filter(Boolean).join("");
   const answer = await ask("The label file was changed by another page or program", [
     `In the file: ${countLabels(file.labels)}${by}.`,

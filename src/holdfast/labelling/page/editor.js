@@ -23,13 +23,8 @@ export class History {
   }
 
   /** Return to the state before. Return false if there is none. */
-  undo() {
-    return this.step(this.past, this.future);
-  }
-
-  redo() {
-    return this.step(this.future, this.past);
-  }
+  undo() { return this.step(this.past, this.future); }
+  redo() { return this.step(this.future, this.past); }
 
   step(from, to) {
     if (!from.length) return false;
@@ -43,8 +38,6 @@ export class History {
 export const EMPTY_RECORDING = {
   fingers: [], labels: {}, proposals: {}, start: 0, end: 1, rate: 1, note: "", read_only: true,
 };
-
-const sameItem = (a, b) => a && b && a.finger === b.finger && a.item.start === b.item.start && a.item.end === b.item.end;
 
 export class Editor {
   /** @param changed called with true if labels or note changed, else with false. */
@@ -76,13 +69,9 @@ export class Editor {
   // Every redraw needs these lists, so they are computed once for each state.
   get openItems() {
     const { state, recording: { proposals } } = this;
-    if (this.cache?.state !== state || this.cache.source !== proposals) {
-      this.cache = {
-        state, source: proposals,
-        proposals: openProposals(state, proposals), reviewItems: findReviewItems(state, proposals),
-      };
-    }
-    return this.cache;
+    if (this.cache?.state === state && this.cache.source === proposals) return this.cache;
+    const open = { proposals: openProposals(state, proposals), reviewItems: findReviewItems(state, proposals) };
+    return (this.cache = { state, source: proposals, ...open });
   }
 
   /** The selected label, unless it was just drawn. */
@@ -156,13 +145,8 @@ export class Editor {
 
   /** Set the state or the cause of the chosen label, or else of the next label. */
   setKind(fields) {
-    const now = this.chosen?.label ?? this.nextKind;
-    let next;
-    if ("state" in fields) next = { state: fields.state, cause: null };
-    else {
-      const cause = now.cause === fields.cause ? null : fields.cause;
-      next = { state: cause && now.state === "stable" ? "unstable" : now.state, cause };
-    }
+    const now = this.chosen?.label ?? this.nextKind, cause = now.cause === fields.cause ? null : fields.cause ?? null;
+    const next = { state: fields.state ?? (cause && now.state === "stable" ? "unstable" : now.state), cause };
     if (!this.chosen) { this.nextKind = next; this.changed(false); return; }
     if (this.readOnly) return;
     const { finger, label } = this.chosen;
@@ -191,15 +175,9 @@ export class Editor {
   /** Accept a proposal, or confirm a label. */
   accept({ kind, finger, item }) {
     const labels = this.state.labels[finger], evidence = [item.author, "accepted", item.evidence].filter(Boolean).join(", ");
-    const confirmed = this.byHand({ evidence });
-    if (kind === "label") {
-      const [changed, label] = change(labels, item, confirmed);
-      this.selected = { finger, label, fresh: true };
-      this.setLabels({ [finger]: changed });
-    } else {
-      this.selected = null;
-      this.setLabels({ [finger]: replaceInterval(labels, { ...item, ...confirmed }, this.bounds.minDuration) });
-    }
+    const label = { ...item, ...this.byHand({ evidence }) };
+    this.selected = kind === "label" ? { finger, label, fresh: true } : null;
+    this.setLabels({ [finger]: replaceInterval(labels, label, this.bounds.minDuration) });
   }
 
   /**
@@ -240,17 +218,11 @@ export class Editor {
 
   /** Return the review item after the last reviewed one, or the first; null if there is none. */
   nextReviewItem() {
-    const items = this.reviewItems, key = (each) => [each.item.confidence, each.item.start, each.finger];
-    const next = this.lastReviewed && items.find((each) => !sameItem(each, this.lastReviewed) && compare(key(each), key(this.lastReviewed)) > 0);
-    return (this.lastReviewed = next ?? items[0] ?? null);
+    const items = this.reviewItems, last = this.lastReviewed;
+    const isAfter = ({ finger, item }) => (item.confidence - last.item.confidence || item.start - last.item.start || finger.localeCompare(last.finger)) > 0;
+    return (this.lastReviewed = (last && items.find(isAfter)) ?? items[0] ?? null);
   }
 }
 
 const differInTime = (one, two) => one.length !== two.length
   || one.some((label, k) => label.start !== two[k].start || label.end !== two[k].end);
-
-// Compare two arrays by their first difference.
-function compare(a, b) {
-  const k = a.findIndex((value, index) => value !== b[index]);
-  return k < 0 ? 0 : a[k] < b[k] ? -1 : 1;
-}

@@ -18,18 +18,11 @@ const middle = (item) => (item.start + item.end) / 2;
 export const labelAt = (labels, time) => labels.find((label) => label.start <= time && time < label.end);
 
 /** Remove [start, end) from labels; drop remainders shorter than `minDuration` [s]. */
-function cut(labels, start, end, minDuration = 0) {
-  const remaining = [];
-  for (const label of labels) {
-    if (label.end <= start || label.start >= end) {
-      remaining.push(label);
-      continue;
-    }
-    if (label.start < start && start - label.start >= minDuration) remaining.push({ ...label, end: start });
-    if (label.end > end && label.end - end >= minDuration) remaining.push({ ...label, start: end });
-  }
-  return remaining;
-}
+const cut = (labels, start, end, minDuration = 0) => labels.flatMap((label) => {
+  if (label.end <= start || label.start >= end) return [label];
+  const parts = [{ ...label, end: start }, { ...label, start: end }];
+  return parts.filter((part) => part.end > part.start && part.end - part.start >= minDuration);
+});
 
 /** Add a label; it replaces what other labels cover of its interval. */
 export const replaceInterval = (labels, label, minDuration = 0) =>

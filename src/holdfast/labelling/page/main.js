@@ -1,20 +1,20 @@
 // Labelling page: connects its parts, and opens recordings.
 
-import { callService } from "../web/api.js";
-import { byId, setText } from "../web/dom.js";
+import { callService } from "../web/connection.js";
+import { byId, setText, showAlert, showToast } from "../web/dom.js";
+import { timeText } from "../web/text.js";
 import { onTheme } from "../web/theme.js";
 import { Commands } from "./commands.js";
 import { offerUnsavedLabels, resolveConflict } from "./conflicts.js";
 import { EMPTY_RECORDING, Editor } from "./editor.js";
-import { timeText } from "./format.js";
-import { OverviewPointer } from "./overview.js";
+import { Overview } from "./overview.js";
 import { RecordingList, ReviewList } from "./panels.js";
 import { Player } from "./player.js";
-import { LAYERS, Plot } from "./plot.js";
 import { Pointer } from "./pointer.js";
+import { Rows } from "./rows.js";
 import { Saver, readStored } from "./saver.js";
 import { Signals } from "./signals.js";
-import { SaveStatus, showAlert, showItem, showToast, showWindow } from "./status.js";
+import { SaveStatus, showItem, showWindow } from "./status_bar.js";
 import { Toolbar } from "./toolbar.js";
 import { View } from "./view.js";
 
@@ -28,7 +28,8 @@ class LabellingPage {
     this.view = new View(() => this.windowChanged());
     this.signals = new Signals((problem) => this.signalsArrived(problem));
     this.editor = new Editor((unsaved) => this.editorChanged(unsaved));
-    this.plot = new Plot(this.editor, this.view, this.signals);
+    this.rows = new Rows(this.editor, this.view, this.signals);
+    this.overview = new Overview(this.view, this.editor, this.signals);
     this.saveStatus = new SaveStatus();
     this.saver = new Saver((...report) => this.saveReported(...report), () => resolveConflict(this));
     this.recordings = new RecordingList((id) => this.open(id));
@@ -36,11 +37,10 @@ class LabellingPage {
     this.player = new Player((time) => this.playTimeChanged(time));
     this.commands = new Commands(this);
     this.toolbar = new Toolbar(this.editor, (command, ...args) => this.commands[command](...args));
-    this.pointer = new Pointer(byId("cursor-canvas"), this.plot, (time) => this.player.seek(time), () => this.showStatus());
-    this.overviewPointer = new OverviewPointer(byId("overview-canvas"), this.view);
+    this.pointer = new Pointer(byId("surface"), this.rows, (time) => this.player.seek(time), () => this.showStatus());
     this.commands.listen();
     byId("save").addEventListener("click", () => (this.saver.stopped ? resolveConflict(this) : this.saver.flush()));
-    onTheme(() => { this.plot.open(); this.plot.redraw(...LAYERS); });
+    onTheme(() => { this.rows.redraw("signals", "labels"); this.overview.draw(); });
     window.addEventListener("hashchange", () => this.open(this.idFromAddress()));
     this.start();
   }
@@ -73,21 +73,14 @@ class LabellingPage {
     this.pointer.cancelDrag();
     await this.saver.flush();
     if (generation !== this.generation) return;
-    if (this.saver.dirty) {
-      const { name } = this.saver.recording;
-      showToast(`${name} is not saved. This browser keeps its labels and offers them when you open the recording again.`, "bad");
-    }
+    if (this.saver.dirty) showToast(`${this.saver.recording.name} is not saved. This browser keeps its labels and offers them again.`, "bad");
     this.id = id;
     window.history.replaceState(null, "", `#${id}`);
     this.recordings.markCurrent(id);
-    let recording;
-    try {
-      recording = await callService("GET", `recordings/${id}`);
-    } catch (error) {
-      if (generation === this.generation) this.openFailed(id, error);
-      return;
-    }
-    if (generation === this.generation) this.opened(recording, generation);
+    const recording = await callService("GET", `recordings/${id}`).catch((error) => ({ error }));
+    if (generation !== this.generation) return;
+    if (recording.error) this.openFailed(id, recording.error);
+    else this.opened(recording, generation);
   }
 
   // Show an empty recording, so that the labels of the previous one disappear.
@@ -103,7 +96,7 @@ class LabellingPage {
     const { id, start, end } = recording;
     showAlert(recording.read_only ? "Read-only: labels of this recording cannot be changed, because they cannot be saved" : "");
     // The signals come first; the change points, which only snapping needs, after them.
-    this.signals.open(id, start, end, this.view.plotWidth)
+    this.signals.open(id, start, end, this.view.width)
       .then(() => this.loadChangePoints(id, generation), (error) => generation === this.generation && showAlert(error.message));
     const unsaved = recording.read_only ? null : this.saver.unsavedCopy(recording);
     if (unsaved) offerUnsavedLabels(this, recording, unsaved);
@@ -113,8 +106,8 @@ class LabellingPage {
     // Without change points, edges snap only to other edges.
     const { fingers } = await callService("GET", `recordings/${id}/changes`).catch(() => ({ fingers: {} }));
     if (generation !== this.generation) return;
-    this.plot.changePoints = fingers;
-    this.plot.redraw("labels");
+    this.rows.changePoints = fingers;
+    this.rows.redraw("labels");
   }
 
   show(recording) {
@@ -124,9 +117,9 @@ class LabellingPage {
     this.saver.open(recording, this.editor.state, this.author);
     this.saveStatus.open(recording);
     this.player.open(recording);
-    this.plot.playTime = null;
+    this.rows.playTime = null;
     setText(byId("play-time"), "");
-    this.plot.open();
+    this.rows.open();
     this.view.open(recording.start, recording.end, MIN_WINDOW_SAMPLES / (recording.rate || 100));
     setText(byId("name"), recording.name);
     byId("name").title = recording.name;
@@ -146,22 +139,23 @@ class LabellingPage {
   }
 
   updateCounts() {
-    const { state, proposals, reviewItems } = this.editor;
-    this.recordings.update(this.id, {
-      n_labels: Object.values(state.labels).flat().length, n_proposals: proposals.length, n_doubtful: reviewItems.length,
-    });
+    const { state, reviewItems } = this.editor;
+    this.recordings.update(this.id, { n_labels: Object.values(state.labels).flat().length, n_doubtful: reviewItems.length });
   }
 
   /** Show a change of labels, selection, focus or preview; `unsaved` if it must be saved. */
   editorChanged(unsaved) {
     if (!this.commands) return;
-    if (unsaved) this.saver.update(this.editor.state);
-    if (unsaved) this.updateCounts();
+    if (unsaved) {
+      this.saver.update(this.editor.state);
+      this.updateCounts();
+    }
     this.toolbar.show();
     this.reviewList.show();
     this.showStatus();
     if (byId("note").value !== this.editor.state.note) byId("note").value = this.editor.state.note;
-    this.plot.redraw("overview", "labels", "cursor");
+    this.rows.redraw("labels");
+    this.overview.showLabels();
   }
 
   showStatus() { showItem(this.editor, this.commands.target()); }
@@ -169,22 +163,26 @@ class LabellingPage {
   // Draw the loaded signals at once, and request finer ones.
   windowChanged() {
     this.pointer?.windowMoved();
-    this.plot?.redraw(...LAYERS);
-    if (this.editor?.fingers.length) this.signals.request(this.view.start, this.view.end, this.view.plotWidth);
+    this.rows?.redraw("signals", "labels");
+    this.overview?.showWindow();
+    if (this.editor?.fingers.length) this.signals.request(this.view.start, this.view.end, this.view.width);
     if (this.signals) showWindow(this.view, this.signals);
   }
 
   signalsArrived(problem) {
     if (problem) showToast(`The signals could not be loaded: ${problem.message}`, "bad");
-    else this.plot.updateSignals();
+    else {
+      this.rows.redraw("signals");
+      this.overview.draw();
+    }
     showWindow(this.view, this.signals);
   }
 
   playTimeChanged(time) {
-    this.plot.playTime = time;
+    this.rows.playTime = time;
     setText(byId("play-time"), `${timeText(time, 0.01)} s`);
     if (this.player.playing) this.view.follow(time);
-    this.plot.redraw("cursor");
+    this.rows.redraw();
   }
 }
 

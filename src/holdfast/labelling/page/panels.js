@@ -1,7 +1,8 @@
 // Panels beside the plots: the list of recordings, and the items to review.
 
-import { byId, make, setText, shape } from "../web/dom.js";
-import { countOf, durationText, labelText, percent, stateKey, timeText } from "./format.js";
+import { byId, make, makeButton, setText, shape } from "../web/dom.js";
+import { duration, percent, stateKey, timeText } from "../web/text.js";
+import { countOf, labelText } from "./format.js";
 
 const MAX_REVIEW_ROWS = 60;
 
@@ -12,17 +13,13 @@ function scrollToRow(row, list) {
 }
 
 // Return how far a recording is labelled: "error", "saved", "inside" its file, or "none".
-function progressOf(entry) {
-  if (entry.error) return "error";
-  if (entry.labelled) return "saved";
-  return entry.n_labels ? "inside" : "none";
-}
+const progressOf = (entry) => (entry.error ? "error" : entry.labelled ? "saved" : entry.n_labels ? "inside" : "none");
 
 // Return the most important fact of a recording.
 function summaryOf(entry) {
   if (entry.error) return "not readable";
   if (entry.n_doubtful) return `${entry.n_doubtful} to review`;
-  return entry.n_labels ? countOf(entry.n_labels, "label") : durationText(entry.duration);
+  return entry.n_labels ? countOf(entry.n_labels, "label") : duration(entry.duration);
 }
 
 /** List of recordings, each with its progress. */
@@ -35,10 +32,8 @@ export class RecordingList {
   open(recordings) {
     this.all = recordings;
     byId("recordings").replaceChildren(...recordings.map((entry) => {
-      const row = make("button", "recording", make("i", "progress-mark"), make("span", "name", entry.name), make("span", "summary"));
-      row.type = "button";
+      const row = makeButton("recording", () => this.choose(entry.id), make("i", "progress-mark"), make("span", "name", entry.name), make("span", "summary"));
       row.dataset.id = String(entry.id);
-      row.addEventListener("click", () => this.choose(entry.id));
       return make("li", "", row);
     }));
     recordings.forEach((entry) => this.show(entry));
@@ -47,10 +42,7 @@ export class RecordingList {
   show(entry) {
     const row = byId("recordings").querySelector(`[data-id="${entry.id}"]`);
     if (!row) return;
-    row.title = entry.error ?? [
-      entry.name, durationText(entry.duration), countOf(entry.n_labels, "label"),
-      countOf(entry.n_proposals, "open proposal"), `${entry.n_doubtful} to review`,
-    ].join(" · ");
+    row.title = entry.error ?? [entry.name, duration(entry.duration), countOf(entry.n_labels, "label")].join(" · ");
     row.dataset.progress = progressOf(entry);
     row.lastElementChild.replaceChildren(summaryOf(entry));
     row.lastElementChild.classList.toggle("warn", Boolean(entry.error || entry.n_doubtful));
@@ -64,10 +56,8 @@ export class RecordingList {
   }
 
   showProgress() {
-    const kinds = this.all.map(progressOf), inside = kinds.filter((kind) => kind === "inside").length;
-    const n = inside + kinds.filter((kind) => kind === "saved").length;
-    setText(byId("progress"), `${n} of ${this.all.length} labelled${inside ? `, ${inside} as imported` : ""}`);
-    byId("progress-bar").style.transform = `scaleX(${this.all.length ? n / this.all.length : 0})`;
+    const n = this.all.filter((entry) => ["saved", "inside"].includes(progressOf(entry))).length;
+    setText(byId("progress"), `${n} of ${this.all.length} labelled`);
   }
 
   markCurrent(id) {
@@ -79,15 +69,8 @@ export class RecordingList {
   }
 
   /** Return the recording before (-1) or after (1) another; undefined at the ends of the list. */
-  neighbour(id, step) {
-    const index = this.all.findIndex((each) => each.id === id);
-    return this.all[index + step];
-  }
+  neighbour(id, step) { return this.all[this.all.findIndex((each) => each.id === id) + step]; }
 }
-
-const REVIEW_TITLES = {
-  label: "This label has a low confidence", proposal: "This proposal has a low confidence",
-};
 
 /** List of the items to review, those of the lowest confidence first, and the number of open proposals. */
 export class ReviewList {
@@ -114,12 +97,10 @@ export class ReviewList {
 
   row(each) {
     const { kind, finger, item } = each;
-    const button = make("button", "review-item", shape(stateKey(item.state)), make("span", "finger", finger), make("span", "text", labelText(item)),
-      make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
-    button.type = "button";
+    const button = makeButton("review-item", () => this.choose(each), shape(stateKey(item.state)), make("span", "finger", finger),
+      make("span", "name", labelText(item)), make("time", "", timeText(item.start, 0.1)), make("b", "", percent(item.confidence)));
     button.dataset.state = stateKey(item.state);
-    button.title = REVIEW_TITLES[kind];
-    button.addEventListener("click", () => this.choose(each));
+    button.title = `This ${kind} has a low confidence`;
     return make("li", "", button);
   }
 }

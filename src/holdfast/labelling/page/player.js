@@ -1,6 +1,6 @@
 // Playback: the time of the video, or of the page's own clock where there is no video.
 
-import { addressWithToken } from "../web/api.js";
+import { addressWithToken } from "../web/connection.js";
 import { byId, make, setText } from "../web/dom.js";
 import { readStored, writeStored } from "./saver.js";
 
@@ -10,9 +10,7 @@ export class Player {
   /** @param timeChanged called with the new time [s]. */
   constructor(timeChanged) {
     this.timeChanged = timeChanged;
-    this.video = byId("video");
-    this.playing = false;
-    this.time = 0;
+    Object.assign(this, { video: byId("video"), playing: false, time: 0 });
     for (const name of ["error", "stalled"]) this.video.addEventListener(name, () => this.videoFailed());
     this.video.addEventListener("loadedmetadata", () => this.seek(this.time));
     this.video.addEventListener("pause", () => { if (this.videoReady && !this.video.ended) this.stop(); });
@@ -41,18 +39,15 @@ export class Player {
     this.medium = medium;
     byId("video-problem").hidden = true;
     byId("video-offset").hidden = !medium;
-    if (!medium) { this.unload(); return; }
+    if (!medium) return this.unload();
     this.video.title = medium.name;
     this.offset = readStored(this.offsetKey) ?? medium.offset;
     byId("offset").value = String(this.offset);
-    if (medium.missing) {
-      this.unload();
-      this.showProblem(`The video ${medium.name} was not found beside the recording`);
-      return;
-    }
+    if (medium.missing) return this.showProblem(`The video ${medium.name} was not found beside the recording`);
     this.video.hidden = false;
     this.video.src = addressWithToken(`media/${this.id}/${medium.index}`).href;
     this.video.playbackRate = this.rate;
+    return undefined;
   }
 
   // Remove the source without an error event.
@@ -73,12 +68,11 @@ export class Player {
   }
 
   videoFailed() {
-    if (!this.medium || !this.video.error) return;
-    this.video.hidden = true;
-    this.showProblem(`The video ${this.medium.name} cannot be played: this browser cannot decode it`);
+    if (this.medium && this.video.error) this.showProblem(`The video ${this.medium.name} cannot be played: this browser cannot decode it`);
   }
 
   showProblem(text) {
+    this.unload();
     byId("video-offset").hidden = true;
     setText(byId("video-problem"), text);
     byId("video-problem").hidden = false;
@@ -95,14 +89,13 @@ export class Player {
   }
 
   toggle() {
-    if (this.playing) { this.stop(); return; }
-    if (this.start === undefined) return;
+    if (this.playing || this.start === undefined) return this.stop();
     if (this.time >= this.end - TOLERANCE) this.seek(this.start);
     this.playing = true;
     this.lastFrame = performance.now();
     this.showButton();
     this.startVideo();
-    requestAnimationFrame((now) => this.step(now));
+    return requestAnimationFrame((now) => this.step(now));
   }
 
   // Play the video if it covers this time. Before and after it, the clock of the page runs alone.

@@ -1,24 +1,23 @@
 // Mouse, pen and touch on the plots: draw labels, move edges, and move the time window.
 
 import { labelAt, snap } from "./labels.js";
-import { LEFT_MARGIN, RIGHT_MARGIN, rowAt, zoneAt } from "./view.js";
 
 const MIN_DRAG_DISTANCE = 4; // [px], a shorter movement is a click
 const EDGE_REACH = { mouse: 6, pen: 8, touch: 16 }; // [px]
 const SNAP_DISTANCE = 9; // [px]
 const MIN_PINCH_DISTANCE = 8; // [px]
-const LINE_HEIGHT = 16, PAGE_HEIGHT = 400; // [px], of wheels that count in lines or pages
+const WHEEL_UNITS = [1, 16, 400]; // [px], of wheels that count in pixels, lines or pages
 
 export class Pointer {
   /**
    * @param seek called with the time of a click [s].
    * @param hovered called when the pointer is over something else.
    */
-  constructor(canvas, plot, seek, hovered) {
-    Object.assign(this, { canvas, plot, seek, hovered, editor: plot.editor, view: plot.view });
+  constructor(surface, rows, seek, hovered) {
+    Object.assign(this, { surface, rows, seek, hovered, editor: rows.editor, view: rows.view });
     this.pressed = new Map(); // x of the pressed pointers [px], by id
     this.drag = null;
-    const on = (name, act, options) => canvas.addEventListener(name, act.bind(this), options);
+    const on = (name, act, options) => surface.addEventListener(name, act.bind(this), options);
     on("pointerdown", this.press);
     on("pointermove", this.move);
     on("pointerup", this.release);
@@ -29,18 +28,19 @@ export class Pointer {
     on("contextmenu", (event) => event.preventDefault());
   }
 
+  // Return the horizontal position of an event in the plots [px].
+  x(event) { return event.clientX - this.surface.getBoundingClientRect().left; }
+
   /** Return finger, time, label, proposal and edge at the position of an event; null without fingers. */
   find(event) {
-    const box = this.canvas.getBoundingClientRect(), x = event.clientX - box.left, y = event.clientY - box.top;
-    const row = rowAt(this.plot.rows, y), finger = this.editor.fingers[row];
-    if (finger === undefined) return null;
-    const time = this.view.time(Math.max(LEFT_MARGIN, Math.min(this.view.width - RIGHT_MARGIN, x)));
-    const zone = zoneAt(this.plot.rows[row], y), labels = this.editor.state.labels[finger];
-    const label = labelAt(labels, time);
+    const x = this.x(event), row = this.rows.rowAt(event.clientY);
+    if (!row) return null;
+    const { finger } = row, time = this.view.time(x), zone = row.zoneAt(event.clientY);
+    const labels = this.editor.state.labels[finger], label = labelAt(labels, time);
     const proposal = this.editor.proposals.find((each) => each.finger === finger && each.item.start <= time && time < each.item.end);
     const reach = (EDGE_REACH[event.pointerType] ?? EDGE_REACH.mouse) * (zone === "labels" ? 1.3 : 0.7);
     const edge = zone === "proposals" ? null : this.nearestEdge(labels, label, x, reach);
-    return { x, y, row, finger, time, zone, label, proposal, edge };
+    return { x, finger, time, zone, label, proposal, edge };
   }
 
   // Return the nearest edge; of two labels that share it, the edge of the label under the pointer.
@@ -63,16 +63,15 @@ export class Pointer {
   snapped(event, finger, time, moved = null) {
     if (event.altKey) return time;
     const { low, high } = this.editor.bounds;
-    const edges = Object.values(this.editor.state.labels).flat()
-      .filter((label) => label !== moved).flatMap((label) => [label.start, label.end]);
-    const others = moved ? edges.filter((edge) => edge !== moved.start && edge !== moved.end) : edges;
-    return snap(time, [low, high, ...others, ...(this.plot.changePoints[finger] ?? [])], SNAP_DISTANCE * this.view.secondsPerPixel);
+    const edges = Object.values(this.editor.state.labels).flat().flatMap((label) => [label.start, label.end])
+      .filter((edge) => edge !== moved?.start && edge !== moved?.end);
+    return snap(time, [low, high, ...edges, ...(this.rows.changePoints[finger] ?? [])], SNAP_DISTANCE * this.view.secondsPerPixel);
   }
 
   press(event) {
-    this.canvas.focus({ preventScroll: true });
+    this.surface.focus({ preventScroll: true });
     this.pressed.set(event.pointerId, event.clientX);
-    this.canvas.setPointerCapture(event.pointerId);
+    this.surface.setPointerCapture(event.pointerId);
     if (this.pressed.size === 2) { this.startPinch(); return; }
     const found = this.find(event);
     if (!found || this.pressed.size > 2) return;
@@ -85,21 +84,20 @@ export class Pointer {
   // With two fingers on a touch screen, the times under them stay under them.
   startPinch() {
     this.editor.setPreview(null);
-    const left = this.canvas.getBoundingClientRect().left;
-    const times = [...this.pressed].map(([id, x]) => [id, this.view.time(x - left)]);
+    const times = [...this.pressed].map(([id, x]) => [id, this.view.time(this.x({ clientX: x }))]);
     this.drag = { mode: "pinch", started: true, times };
   }
 
   /** Update what is under the pointer after the window has moved. */
   windowMoved() {
-    if (this.lastEvent && this.plot.hover && !this.drag) this.plot.hover = this.find(this.lastEvent);
+    if (this.lastEvent && this.rows.hover && !this.drag) this.rows.hover = this.find(this.lastEvent);
   }
 
   move(event) {
     const found = this.find(event), { drag } = this;
     this.lastEvent = event;
     if (!found) return;
-    this.plot.hoveredProposal = drag ? null : found.proposal ?? null;
+    this.rows.hoveredProposal = drag ? null : found.proposal ?? null;
     const lastX = this.pressed.get(event.pointerId);
     if (this.pressed.has(event.pointerId)) this.pressed.set(event.pointerId, event.clientX);
     if (!drag) { this.hover(found); return; }
@@ -107,46 +105,27 @@ export class Pointer {
     if (!drag.started) return;
     if (drag.mode === "pinch") this.pinch();
     else if (drag.mode === "pan") this.view.pan((lastX - event.clientX) * this.view.secondsPerPixel);
-    else {
-      this.panBeyondEdge(found.x);
-      this.applyDrag(event, false);
-    }
-    const { snapTime } = this.plot;
-    this.hover({ ...found, time: snapTime ?? found.time, x: snapTime === null ? found.x : this.view.x(snapTime) });
+    else this.applyDrag(event, false);
+    this.hover({ ...found, time: this.rows.snapTime ?? found.time });
   }
 
   pinch() {
-    const left = this.canvas.getBoundingClientRect().left;
     const [[a, timeA], [b, timeB]] = this.drag.times;
-    const [xa, xb] = [a, b].map((id) => this.pressed.get(id) - left);
+    const [xa, xb] = [a, b].map((id) => this.x({ clientX: this.pressed.get(id) }));
     if (Math.abs(xa - xb) < MIN_PINCH_DISTANCE || timeA === timeB) return;
     const secondsPerPixel = Math.abs((timeB - timeA) / (xb - xa));
-    const start = timeA - (xa - LEFT_MARGIN) * secondsPerPixel;
-    this.view.setWindow(start, start + secondsPerPixel * this.view.plotWidth);
-  }
-
-  // A drag beyond the left or right edge of the plot moves the window.
-  panBeyondEdge(x) {
-    const beyond = Math.min(0, x - LEFT_MARGIN) + Math.max(0, x - (this.view.width - RIGHT_MARGIN));
-    if (beyond) this.view.pan(0.3 * beyond * this.view.secondsPerPixel);
+    const start = timeA - xa * secondsPerPixel;
+    this.view.setWindow(start, start + secondsPerPixel * this.view.width);
   }
 
   // Change labels as the drag demands, or only preview it unless `commit`.
   applyDrag(event, commit) {
     const { mode, finger, edge, from } = this.drag, { time } = this.find(event);
-    if (mode === "edge" || mode === "label") {
-      const to = this.snapped(event, finger, time, edge?.label);
-      this.plot.snapTime = to === time ? null : to;
-      if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
-      else this.editor.draw(this.fingersOf(event, finger), from, to, commit);
-    }
-    if (commit) this.plot.snapTime = null;
-  }
-
-  // Return the finger of a drag; with Ctrl all fingers, this one first.
-  fingersOf(event, finger) {
-    if (!event.ctrlKey && !event.metaKey) return [finger];
-    return [finger, ...this.editor.fingers.filter((name) => name !== finger)];
+    if (mode !== "edge" && mode !== "label") return;
+    const to = this.snapped(event, finger, time, edge?.label), isForAll = event.ctrlKey || event.metaKey;
+    this.rows.snapTime = commit || to === time ? null : to;
+    if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
+    else this.editor.draw(isForAll ? [finger, ...this.editor.fingers.filter((name) => name !== finger)] : [finger], from, to, commit);
   }
 
   release(event) {
@@ -162,7 +141,7 @@ export class Pointer {
 
   leave() {
     if (this.drag) return;
-    this.lastEvent = this.plot.hoveredProposal = null;
+    this.lastEvent = this.rows.hoveredProposal = null;
     this.hover(null);
   }
 
@@ -175,7 +154,7 @@ export class Pointer {
   cancelDrag() {
     const hadDrag = this.drag !== null;
     this.drag = null;
-    this.plot.snapTime = null;
+    this.rows.snapTime = null;
     if (hadDrag) this.editor.setPreview(null);
     return hadDrag;
   }
@@ -192,17 +171,17 @@ export class Pointer {
   }
 
   hover(found) {
-    this.plot.hover = found;
+    this.rows.hover = found;
     const edge = this.drag ? this.drag.mode === "edge" : found?.edge && !this.editor.readOnly;
-    this.canvas.style.cursor = this.drag?.mode === "pan" ? "grabbing" : edge ? "col-resize" : "crosshair";
-    this.plot.redraw("cursor");
+    this.surface.style.cursor = this.drag?.mode === "pan" ? "grabbing" : edge ? "col-resize" : "crosshair";
+    this.rows.redraw();
     this.hovered(found);
   }
 
   // The wheel zooms; a sideways movement, or Shift, moves the window.
   wheel(event) {
     event.preventDefault();
-    const unit = event.deltaMode === 1 ? LINE_HEIGHT : event.deltaMode === 2 ? PAGE_HEIGHT : 1;
+    const unit = WHEEL_UNITS[event.deltaMode];
     const sideways = event.shiftKey && !event.deltaX ? event.deltaY : event.deltaX;
     if (Math.abs(sideways) > Math.abs(event.shiftKey ? 0 : event.deltaY)) {
       this.view.pan(sideways * unit * this.view.secondsPerPixel);

@@ -1,6 +1,6 @@
 // Save the labels: in the browser at once, and with the service a moment later.
 
-import { callService } from "../web/api.js";
+import { callService } from "../web/connection.js";
 
 const SAVE_DELAY = 300; // [ms] after the last change
 const RETRY_DELAYS = [1000, 2000, 5000, 10000]; // [ms]
@@ -17,15 +17,12 @@ export function readStored(key) {
   }
 }
 
-/** Write a JSON value to the browser's storage; null removes it. Return false if that fails. */
+/** Write a JSON value to the browser's storage; null removes it. */
 export function writeStored(key, value) {
   try {
     if (value === null) window.localStorage.removeItem(key);
     else window.localStorage.setItem(key, JSON.stringify(value));
-    return true;
-  } catch {
-    return false; // private window, or storage full
-  }
+  } catch { /* private window, or storage full */ }
 }
 
 export class Saver {
@@ -118,14 +115,10 @@ export class Saver {
   async send(recording) {
     const state = this.state, { labels, note } = state;
     this.report("saving");
-    let reply, problem = null;
-    try {
-      reply = await callService("PUT", `recordings/${recording.id}/labels`, { labels, note, author: this.author, revision: this.revision });
-    } catch (error) {
-      problem = error;
-    }
+    const body = { labels, note, author: this.author, revision: this.revision };
+    const reply = await callService("PUT", `recordings/${recording.id}/labels`, body).catch((problem) => ({ problem }));
     if (this.recording !== recording) return; // another recording was opened
-    if (problem) this.failed(problem);
+    if (reply.problem) this.failed(reply.problem);
     else this.succeeded(state, reply);
   }
 

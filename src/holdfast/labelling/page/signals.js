@@ -1,35 +1,17 @@
 // Signals of the recording from the service: the whole recording at low resolution, and the time
 // window with a margin at the resolution of the screen.
 
-import { callService } from "../web/api.js";
+import { callService } from "../web/connection.js";
+import { nearestIndex } from "../web/plot.js";
+import { indexAt } from "../web/store.js";
 
-const SERIES = ["F_a", "F_x", "F_y", "F_z", "sigma"];
+const SERIES = ["t", "F_a", "F_x", "F_y", "F_z", "sigma"];
 const MARGIN = 0.4; // on either side, as a fraction of the window
 const PAIRS_PER_PIXEL = 0.75; // requested; each pair is a minimum and a maximum
 const MIN_PAIRS_PER_PIXEL = 0.6; // with fewer, finer data are requested
 const MIN_POINTS = 100, MAX_POINTS = 5000; // of one request
 const MIN_COARSE_POINTS = 600;
 const REQUEST_DELAY = 20; // [ms], so that one turn of the wheel makes one request
-
-const toNumbers = (values) => Float64Array.from(values, (v) => (v === null ? NaN : v));
-
-function decode(response, points) {
-  const fingers = new Map(Object.entries(response.fingers).map(([finger, own]) => [
-    finger, Object.fromEntries(["t", ...SERIES].map((key) => [key, toNumbers(own[key] ?? [])])),
-  ]));
-  return { start: response.start, end: response.end, exact: response.exact, points, fingers };
-}
-
-/** Return the index of the first of the sorted times that is not before `time`. */
-export function indexAt(times, time) {
-  let [low, high] = [0, times.length];
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (times[middle] < time) low = middle + 1;
-    else high = middle;
-  }
-  return low;
-}
 
 export class Signals {
   /** @param arrived called with null after new data, or with an error. */
@@ -41,9 +23,9 @@ export class Signals {
 
   close() {
     this.generation += 1;
-    this.coarse = this.fine = null;
+    this.coarse = this.fine = this.requested = null;
+    this.joined = new Map(); // coarse and fine data of each finger
     this.loading = false;
-    this.requested = null;
     this.timer = clearTimeout(this.timer); // undefined
   }
 
@@ -60,7 +42,7 @@ export class Signals {
 
   async fetch(start, end, points) {
     const query = new URLSearchParams({ start, end, points });
-    return decode(await callService("GET", `recordings/${this.id}/signals?${query}`), points);
+    return { ...await callService("GET", `recordings/${this.id}/signals?${query}`), points };
   }
 
   /**
@@ -81,15 +63,11 @@ export class Signals {
     const points = Math.min(MAX_POINTS, Math.round((PAIRS_PER_PIXEL * width * (to - from)) / (end - start)));
     this.loading = true;
     let problem = null;
-    try {
-      const data = await this.fetch(from, to, Math.max(MIN_POINTS, points));
-      if (generation !== this.generation) return;
-      this.fine = data;
-    } catch (error) {
-      problem = error;
-    }
+    const data = await this.fetch(from, to, Math.max(MIN_POINTS, points)).catch((error) => { problem = error; });
     if (generation !== this.generation) return;
     this.loading = false;
+    this.fine = data ?? this.fine;
+    this.joined.clear();
     this.arrived(problem);
     if (!problem && this.requested.some((value, k) => value !== [start, end, width][k])) this.request(...this.requested);
   }
@@ -100,24 +78,23 @@ export class Signals {
       && (data.exact || data.points / (data.end - data.start) >= (MIN_PAIRS_PER_PIXEL * width) / (end - start)));
   }
 
-  /** Return the finest loaded data of a finger over a window, as segments (data, from, to). */
-  segments(finger, start, end) {
-    const coarseData = this.coarse?.fingers.get(finger), fineData = this.fine?.fingers.get(finger);
-    if (!coarseData) return [];
-    const { fine } = this;
-    if (!fineData || this.coarse.exact || fine.end <= start || fine.start >= end) return [[coarseData, start, end]];
-    const segments = [[fineData, Math.max(start, fine.start), Math.min(end, fine.end)]];
-    if (fine.start > start) segments.unshift([coarseData, start, fine.start]);
-    if (fine.end < end) segments.push([coarseData, fine.end, end]);
-    return segments;
+  /** Return the columns of a finger: the fine data, and the coarse data around them; null without data. */
+  columns(finger) {
+    const around = this.coarse?.fingers[finger], inside = this.fine?.fingers[finger];
+    if (!around || !inside || this.coarse.exact) return around ?? null;
+    if (!this.joined.has(finger)) {
+      const [from, to] = [this.fine.start, this.fine.end].map((time) => indexAt(around.t, time));
+      this.joined.set(finger, Object.fromEntries(SERIES.map(
+        (key) => [key, [...around[key].slice(0, from), ...inside[key], ...around[key].slice(to)]])));
+    }
+    return this.joined.get(finger);
   }
 
   /** Return the values of the loaded sample nearest to a time, by series; null without data. */
   valuesAt(finger, time) {
-    const [[data] = []] = this.segments(finger, time, time + 1e-9);
-    if (!data?.t.length) return null;
-    let index = Math.min(data.t.length - 1, indexAt(data.t, time));
-    if (index > 0 && time - data.t[index - 1] < data.t[index] - time) index -= 1;
-    return Object.fromEntries(SERIES.map((key) => [key, data[key][index]]));
+    const columns = this.columns(finger);
+    if (!columns?.t.length) return null;
+    const index = nearestIndex(columns.t, time);
+    return Object.fromEntries(SERIES.map((key) => [key, columns[key][index]]));
   }
 }

@@ -1,7 +1,8 @@
 // Toolbar above the plots: buttons for states, causes and edits.
 
-import { byId, make, shape } from "../web/dom.js";
-import { CAUSES, causeKey, STATES, stateKey, stateText } from "./format.js";
+import { byId, fillChoice, make, setPressed, setText, shape } from "../web/dom.js";
+import { stateKey, withSpaces } from "../web/text.js";
+import { CAUSES, causeKey, STATES } from "./format.js";
 
 const EDITS = ["undo", "redo", "copy", "remove"]; // names of commands, and ids of their buttons
 
@@ -14,30 +15,23 @@ export class Toolbar {
   /** @param run called with the name of a command and its argument. */
   constructor(editor, run) {
     this.editor = editor;
-    this.states = STATES.map((state, k) => this.button(byId("states"), state, run, { state }, String(k + 1),
-      [shape(stateKey(state)), make("span", "", stateText(state)), make("kbd", "", String(k + 1))]));
-    this.causes = CAUSES.map((cause) => this.button(byId("causes"), cause, run, { cause },
-      causeKey(cause).toUpperCase(), [causeText(cause)]));
+    fillChoice(byId("states"), STATES.map((state, k) => ({
+      value: state, title: `${withSpaces(state)} (${k + 1})`, content: [shape(stateKey(state)), make("span", "", withSpaces(state)), make("kbd", "", String(k + 1))],
+    })), null, (state) => run("setKind", { state }));
+    fillChoice(byId("causes"), CAUSES.map((cause) => ({
+      value: cause, title: `${cause} (${causeKey(cause).toUpperCase()})`, content: [causeText(cause)],
+    })), null, (cause) => run("setKind", { cause }));
+    for (const button of byId("states").children) button.dataset.state = stateKey(button.dataset.value);
     for (const name of EDITS) byId(name).addEventListener("click", () => run(name));
-  }
-
-  button(row, value, run, fields, key, content) {
-    const button = make("button", "", ...content);
-    Object.assign(button, { type: "button", title: `${stateText(value)} (${key})` });
-    if (fields.state) button.dataset.state = stateKey(value);
-    button.dataset.value = value;
-    button.addEventListener("click", () => run("setKind", fields));
-    row.append(button);
-    return button;
   }
 
   /** Show which buttons are pressed and which are enabled. */
   show() {
     const { editor } = this, { readOnly, history } = editor, now = editor.chosen?.label ?? editor.nextKind;
-    byId("edited-label").textContent = editor.chosen ? "this label" : "next label";
-    for (const button of this.states) button.setAttribute("aria-pressed", String(button.dataset.value === now.state));
-    for (const button of this.causes) button.setAttribute("aria-pressed", String(button.dataset.value === now.cause));
-    for (const button of [...this.states, ...this.causes]) button.disabled = readOnly;
+    setText(byId("edited-label"), editor.chosen ? "this label" : "next label");
+    setPressed(byId("states"), now.state);
+    setPressed(byId("causes"), now.cause);
+    for (const button of document.querySelectorAll(".choice button")) button.disabled = readOnly;
     byId("undo").disabled = readOnly || !history.past.length;
     byId("redo").disabled = readOnly || !history.future.length;
     byId("copy").disabled = readOnly || !editor.selected || editor.fingers.length < 2;

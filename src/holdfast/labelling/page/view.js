@@ -1,16 +1,12 @@
-// Geometry of the plots: the visible time window, and the rows of the fingers.
+// Visible time window of a recording, and its mapping to the width of the plots.
 
 const clamp = (value, low, high) => Math.max(low, Math.min(high, value));
 
-export const LEFT_MARGIN = 52; // [px], for the numbers of the axes
-export const RIGHT_MARGIN = 10; // [px]
-
-/** Visible time window of a recording, and its mapping to pixels. */
 export class View {
   /** @param changed called after every change of the window. */
   constructor(changed) {
     this.changed = changed;
-    this.width = 600; // of the canvas [px]
+    this.width = 600; // of the plots [px]
     this.open(0, 1, 0.01);
   }
 
@@ -24,19 +20,17 @@ export class View {
   }
 
   get span() { return this.end - this.start; }
-  get plotWidth() { return Math.max(1, this.width - LEFT_MARGIN - RIGHT_MARGIN); }
-  get secondsPerPixel() { return this.span / this.plotWidth; }
+  get secondsPerPixel() { return this.span / this.width; }
 
-  x(time) { return LEFT_MARGIN + (time - this.start) / this.secondsPerPixel; }
-  time(x) { return this.start + (x - LEFT_MARGIN) * this.secondsPerPixel; }
+  x(time) { return (time - this.start) / this.secondsPerPixel; }
+  time(x) { return this.start + clamp(x, 0, this.width) * this.secondsPerPixel; }
 
   contains({ start, end }) { return start >= this.start && end <= this.end; }
 
   /** Show [start, end], or the nearest window within the recording. */
   setWindow(start, end) {
     const span = clamp(end - start, this.minSpan, this.high - this.low);
-    const middle = (start + end) / 2;
-    const first = clamp(middle - span / 2, this.low, this.high - span);
+    const first = clamp((start + end - span) / 2, this.low, this.high - span);
     if (first === this.start && first + span === this.end) return;
     [this.start, this.end] = [first, first + span];
     this.changed();
@@ -68,33 +62,4 @@ export class View {
   follow(time) {
     if (time < this.start || time > this.end) this.setWindow(time - 0.1 * this.span, time + 0.9 * this.span);
   }
-}
-
-const ROW_GAP = 8; // [px], between fingers
-const TOP_GAP = 5; // [px], above the force
-const PLOT_GAP = 4; // [px], between the parts of a row
-const TALL_ROW = 170; // [px], taller rows have thicker strips
-
-/** Divide a height [px] into rows of equal height; each part of a row is [top, bottom]. */
-export function rowLayout(n, height) {
-  const each = height / Math.max(1, n), tall = each > TALL_ROW;
-  const labelHeight = tall ? 28 : 22, proposalHeight = tall ? 14 : 10;
-  return Array.from({ length: n }, (_, k) => {
-    const top = k * each, bottom = top + each - ROW_GAP;
-    const proposals = [bottom - proposalHeight, bottom];
-    const labels = [proposals[0] - 2 - labelHeight, proposals[0] - 2];
-    const plotHeight = labels[0] - PLOT_GAP - (top + TOP_GAP);
-    const split = top + TOP_GAP + Math.round(0.62 * plotHeight);
-    return { top, bottom, force: [top + TOP_GAP, split - PLOT_GAP], sigma: [split + PLOT_GAP, labels[0] - PLOT_GAP], labels, proposals };
-  });
-}
-
-/** Return the index of the row at a height; above and below the rows, that of the nearest row. */
-export const rowAt = (rows, y) =>
-  Math.max(0, Math.min(rows.length - 1, rows.findIndex((row) => y < row.bottom + ROW_GAP / 2) >>> 0));
-
-/** Return the part of a row at a height: "labels", "proposals" or "plot". */
-export function zoneAt(row, y) {
-  if (y >= row.labels[0] && y < row.labels[1] + 1) return "labels";
-  return y >= row.proposals[0] - 1 ? "proposals" : "plot";
 }

@@ -25,9 +25,6 @@ from holdfast.web.guard import Guard
 
 LIVE_DOCUMENT_RATE = 20.0
 """Number of live documents per second [Hz]."""
-MAX_QUEUED_DOCUMENTS = {"live": 32, "estimates": 1024}
-"""Maximum number of documents that wait for a slow client: more than a second. The oldest is
-dropped first."""
 HEARTBEAT_INTERVAL = 6.0
 """Time between two pings; a client that does not answer within half of it is disconnected [s]."""
 MAX_WEBSOCKETS = 64
@@ -43,47 +40,6 @@ SHARED_FOLDER = Path(str(resources.files("holdfast.web") / "static"))
 """Files that all pages share."""
 
 _encode = msgspec.json.Encoder().encode
-
-
-class WebSocketClient:
-    """One WebSocket with a queue of documents, so that a slow client delays no other.
-
-    Args:
-        socket: that is connected.
-        max_queued: maximum number of documents in the queue.
-        address: of the client.
-    """
-
-    def __init__(
-        self, socket: web.WebSocketResponse, max_queued: int, address: str | None = None
-    ) -> None:
-        self._socket = socket
-        self.address = address
-        self._queue: asyncio.Queue[str] = asyncio.Queue(max_queued)
-
-    def put(self, text: str) -> None:
-        """Append a document to the queue; drop the oldest if the queue is full."""
-        # The oldest goes: for a page and for control, the newest state counts.
-        if self._queue.full():
-            self._queue.get_nowait()
-        self._queue.put_nowait(text)
-
-    async def run(self) -> None:
-        """Send documents until the client disconnects."""
-        # Reading is needed too: it answers pings, and ends when the client disconnects.
-        sending = asyncio.ensure_future(self._send())
-        try:
-            async for message in self._socket:
-                if message.type is WSMsgType.ERROR:
-                    break
-        finally:
-            sending.cancel()
-            with suppress(asyncio.CancelledError, ConnectionError):
-                await sending
-
-    async def _send(self) -> None:
-        while True:
-            await self._socket.send_str(await self._queue.get())
 
 
 class LiveService:
@@ -110,8 +66,12 @@ class LiveService:
         self._recorder = SessionRecorder(session, folder)
         self._status = StatusPublisher(session, report)
         self._started = time.time()
-        self._clients: dict[str, set[WebSocketClient]] = {"live": set(), "estimates": set()}
+        self._addresses: list[str | None] = []  # of the WebSockets
+        # Set at the next document of a kind, and then replaced by a new one. Every client sends by
+        # itself what is new to it: a slow one misses documents, and delays no other.
+        self._news = {"live": asyncio.Event(), "estimates": asyncio.Event()}
         self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
+        self._encoded: tuple[StreamUpdate | None, list[str]] = (None, [])  # once for all clients
         self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
         self.app = web.Application(middlewares=[guard.middleware])
         routes: list[web.AbstractRouteDef] = [
@@ -137,19 +97,18 @@ class LiveService:
         """Publish the session while the application runs."""
         loop = asyncio.get_running_loop()
 
-        def put(update: StreamUpdate) -> None:
-            self._status.put(update)
-            if self._clients["estimates"]:
+        def wake(_: StreamUpdate) -> None:
+            if self._addresses:
                 with suppress(RuntimeError):  # the service has ended before the session
-                    loop.call_soon_threadsafe(self._send_estimates, update)
+                    loop.call_soon_threadsafe(self._announce, "estimates")
 
-        self._session.add_listener(put)
+        self._session.add_listener(wake)
         sending = asyncio.ensure_future(self._send_live())
         yield
         sending.cancel()
         with suppress(asyncio.CancelledError):
             await sending
-        self._session.remove_listener(put)
+        self._session.remove_listener(wake)
         if self._recorder.current is not None:
             with suppress(HoldfastError):  # no client is left; the file contains what was written
                 await asyncio.to_thread(self._recorder.stop)
@@ -166,27 +125,46 @@ class LiveService:
                     self._status.add_notice(f"the recording has ended: {failure}")
             document = self._status.live_document(self._recorder.current)
             self._newest_document = _encode(document)
-            for client in self._clients["live"]:
-                client.put(self._newest_document.decode())
+            self._announce("live")
 
-    def _send_estimates(self, update: StreamUpdate) -> None:
-        for estimate, updated in update.estimates:
-            fingers = {name: finger_document(estimate.fingers[name]) for name in updated}
-            document = schema.EstimateDocument(
-                time=estimate.time, hand=estimate.state, fingers=fingers
-            )
-            text = _encode(document).decode()
-            for client in self._clients["estimates"]:
-                client.put(text)
+    def _announce(self, kind: str) -> None:
+        news, self._news[kind] = self._news[kind], asyncio.Event()
+        news.set()
+
+    async def _live_documents(self) -> AsyncIterator[str]:
+        while True:
+            await self._news["live"].wait()
+            yield self._newest_document.decode()
+
+    async def _estimate_documents(self, n_read: int) -> AsyncIterator[str]:
+        while True:
+            news = self._news["estimates"]  # before the look: what comes after it sets this one
+            updates, n_read = self._session.updates_since(n_read)
+            for _, update in updates:
+                for text in self._estimate_texts(update):
+                    yield text
+            if not updates:
+                await news.wait()
+
+    def _estimate_texts(self, update: StreamUpdate) -> list[str]:
+        if self._encoded[0] is not update:
+            documents = [
+                schema.EstimateDocument(
+                    time=estimate.time,
+                    hand=estimate.state,
+                    fingers={name: finger_document(estimate.fingers[name]) for name in updated},
+                )
+                for estimate, updated in update.estimates
+            ]
+            self._encoded = update, [_encode(document).decode() for document in documents]
+        return self._encoded[1]
 
     async def _serve_socket(self, request: web.Request, kind: str) -> web.WebSocketResponse:
         # The total first: with it full, the address does not matter.
-        if sum(map(len, self._clients.values())) >= MAX_WEBSOCKETS:
+        if len(self._addresses) >= MAX_WEBSOCKETS:
             text = f"{MAX_WEBSOCKETS} WebSockets are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
-        n_own = sum(
-            client.address == request.remote for each in self._clients.values() for client in each
-        )
+        n_own = self._addresses.count(request.remote)
         if n_own >= MAX_WEBSOCKETS_PER_ADDRESS:
             text = f"{n_own} WebSockets of {request.remote} are open; close one of them"
             raise json_error(web.HTTPServiceUnavailable, text)
@@ -194,16 +172,29 @@ class LiveService:
             heartbeat=HEARTBEAT_INTERVAL, compress=False, max_msg_size=1024
         )
         await socket.prepare(request)
-        # The constants go first, and only then is the client one of those that get documents.
-        client = WebSocketClient(socket, MAX_QUEUED_DOCUMENTS[kind], request.remote)
-        client.put(_encode(self._hello()).decode())
-        clients = self._clients[kind]
-        clients.add(client)
+        documents = (
+            self._live_documents()
+            if kind == "live"
+            else self._estimate_documents(self._session.n_updates)
+        )
+        self._addresses.append(request.remote)
+        sending = asyncio.ensure_future(self._send(socket, documents))
         try:
-            await client.run()
+            # Reading is needed too: it answers pings, and ends when the client disconnects.
+            async for message in socket:
+                if message.type is WSMsgType.ERROR:
+                    break
         finally:
-            clients.discard(client)
+            self._addresses.remove(request.remote)
+            sending.cancel()
+            with suppress(asyncio.CancelledError, ConnectionError):
+                await sending
         return socket
+
+    async def _send(self, socket: web.WebSocketResponse, documents: AsyncIterator[str]) -> None:
+        await socket.send_str(_encode(self._hello()).decode())
+        async for text in documents:
+            await socket.send_str(text)
 
     def _hello(self) -> schema.HelloDocument:
         return hello_document(self._session, self._started, self._recorder.enabled)

@@ -18,7 +18,7 @@ LINES = "holdfast.plots.rows[0].kind.lines.map(({ label }) => label)"
 KINDS = "holdfast.plots.rows.map(({ kind }) => kind.key)"
 SLIPS = """[...document.querySelectorAll(".card")].map((card) => card.querySelector(".slips"))
   .filter((pill) => pill.checkVisibility()).length"""
-DRAWN = """[...holdfast.plots.rows.map(({ plot }) => JSON.stringify(plot.data)),
+DRAWN = """[...holdfast.plots.rows.map(({ plot }) => JSON.stringify(plot.plot.data)),
   ...[...document.querySelectorAll(".map canvas")].map((canvas) => canvas.toDataURL())]"""
 INKED = """[...document.querySelectorAll(".map canvas")].every((canvas) => canvas.getContext("2d")
   .getImageData(0, 0, canvas.width, canvas.height).data.some((value) => value > 0))"""
@@ -53,7 +53,7 @@ def test_see_states_forces_and_the_taxel_map_of_a_finger(visit, service, size):
     page.click("#fingers button:first-child")
     assert page.evaluate(LINES) == list(FINGERS)
     service.change(state="NO_CONTACT", **values)
-    shows(page, f"{INDEX} .meter", r"^stable\s*–$")  # without contact nothing can be stable
+    shows(page, f"{INDEX} .values", r"^stable\s*–")  # without contact nothing can be stable
     service.change(state="UNSTABLE", **values)
     shows(page, "#events li", r"hand\s*no contact\s*→\s*unstable\s*thumb, index, middle, ring")
     shows(page, "#hand-spoken", "unstable")  # for screen readers
@@ -99,7 +99,7 @@ def test_pause_look_back_and_go_on(visit, service, size):
     service.change(state="UNSTABLE")  # states are still updated
     shows(page, "#hand-word", "UNSTABLE")
     page.click("#windows button:first-child")  # and what is frozen can be looked at
-    assert page.evaluate("holdfast.plots.rows[0].plot.scales.x.min") == -5
+    assert page.evaluate("holdfast.plots.rows[0].plot.plot.scales.x.min") == -5
     assert flaws(page, size) == []
     page.click("#pause")
     assert page.locator("#paused").is_hidden()
@@ -313,7 +313,7 @@ def test_leave_the_page_open_for_minutes(visit, service):
     assert page.evaluate("holdfast.store.times.length") == 24_000
     assert page.locator("#notices li").count() == 50
     assert page.locator("#events li").count() <= 50
-    assert page.evaluate("holdfast.plots.rows[0].plot.data[0].length") < 1300
+    assert page.evaluate("holdfast.plots.rows[0].plot.plot.data[0].length") < 1300
 
 
 def test_see_what_a_sensor_server_sends(visit, tmp_path):

@@ -1,62 +1,47 @@
-// Banner with the state of the hand, alert below it, and status line at the foot of the page.
+// Banner with the state of the hand, and status line at the foot of the page.
 
-import { byId, make, setText } from "../web/dom.js";
-import { NO_VALUE, delay, isLate, latency, stateKey, stateWord } from "./format.js";
+import { byId, make, setShape, setText } from "../web/dom.js";
+import { NO_VALUE, stateKey } from "../web/text.js";
+import { delay, isLate, latency, stateWord } from "./format.js";
 
 const ANNOUNCE_INTERVAL = 1500; // [ms]; a screen reader cannot follow 20 announcements a second
+const PARTS = {
+  rate: "rate", p50: "latency p50", p99: "p99", max: "max", delay: "late by",
+  n_packets: "packets", n_lost: "lost", n_refused: "refused", n_dropped: "dropped",
+};
 
 export class HandBanner {
-  constructor() {
-    this.box = byId("hand");
-    this.announced = { text: "", at: -Infinity };
-  }
+  constructor() { this.announced = { word: "", at: -Infinity }; }
 
   start(hello) {
-    const about = [hello.model, hello.source].map(String).join(" · ");
+    const about = `${hello.model} · ${hello.source}`;
     setText(byId("about"), about);
     byId("about").title = about;
     document.title = `holdfast · ${hello.source}`;
   }
 
   showState(state, word = stateWord(state)) {
-    const key = stateKey(state);
+    const key = stateKey(state), box = byId("hand"), now = performance.now();
     setText(byId("hand-word"), word);
-    if (this.box.dataset.state !== key) {
-      this.box.dataset.state = key;
-      byId("hand-shape").setAttribute("href", `#shape-${key}`);
-    }
-    const now = performance.now();
-    if (word !== this.announced.text && now - this.announced.at > ANNOUNCE_INTERVAL) {
-      this.announced = { text: word, at: now };
-      byId("hand-spoken").textContent = `Hand: ${word.toLowerCase()}`;
-    }
+    if (box.dataset.state !== key) setShape(box.querySelector(".shape"), key);
+    box.dataset.state = key;
+    if (word === this.announced.word || now - this.announced.at <= ANNOUNCE_INTERVAL) return;
+    this.announced = { word, at: now };
+    setText(byId("hand-spoken"), `Hand: ${word.toLowerCase()}`);
   }
 }
 
-/** Show the first of these texts that is not empty, or hide the alert. */
-export function showAlert(...texts) {
-  const text = texts.find(Boolean) ?? "", box = byId("alert");
-  setText(box, text);
-  box.hidden = !text;
-}
+const whole = (n) => (n ?? null) === null ? NO_VALUE : n.toLocaleString("en").replaceAll(",", "\u202f");
 
 /** Status line at the foot of the page. */
 export class HealthLine {
   constructor(footer) {
-    const part = (key, label) => {
-      const value = make("b", "", NO_VALUE);
-      footer.append(make("span", key, label, " ", value));
-      return value;
-    };
-    this.link = make("b", "", "connecting");
-    footer.append(make("span", "link", make("i", "dot"), this.link));
-    this.rate = part("rate", "rate");
-    this.latencies = { p50: part("latency", "latency p50"), p99: part("late", "p99"), max: part("worst", "max") };
-    this.delay = part("delay", "late by");
-    this.delay.parentElement.hidden = true;
-    this.packets = part("packets", "packets");
-    this.counts = ["lost", "refused", "dropped"].map((key) => part(key, key));
     this.footer = footer;
+    this.link = make("b", "", "connecting");
+    this.values = Object.fromEntries(Object.keys(PARTS).map((key) => [key, make("b", "", NO_VALUE)]));
+    footer.append(make("span", "link", make("i", "dot"), this.link),
+      ...Object.entries(PARTS).map(([key, label]) => make("span", key, label, " ", this.values[key])));
+    this.values.delay.parentElement.hidden = true;
   }
 
   showConnection(state, text) {
@@ -65,17 +50,15 @@ export class HealthLine {
   }
 
   update(health) {
-    const whole = (n) => (n === null || n === undefined ? NO_VALUE : n.toLocaleString("en").replaceAll(",", "\u202f"));
-    setText(this.rate, health.rate === null || health.rate === undefined ? NO_VALUE : `${health.rate.toFixed(1)} Hz`);
-    for (const [key, element] of Object.entries(this.latencies)) setText(element, latency(health.latency?.[key]));
-    setText(this.delay, delay(health.delay));
+    const show = (key, text, isBad) => {
+      setText(this.values[key], text);
+      this.values[key].parentElement.classList.toggle("bad", isBad);
+    };
+    show("rate", (health.rate ?? null) === null ? NO_VALUE : `${health.rate.toFixed(1)} Hz`, false);
+    for (const key of ["p50", "p99", "max"]) show(key, latency(health.latency?.[key]), false);
+    show("delay", delay(health.delay), true);
     // Shown while it matters alone: the foot has one line on a tablet.
-    this.delay.parentElement.hidden = !isLate(health.delay);
-    this.delay.parentElement.classList.toggle("bad", isLate(health.delay));
-    setText(this.packets, whole(health.n_packets));
-    [health.n_lost, health.n_refused, health.n_dropped].forEach((n, k) => {
-      setText(this.counts[k], whole(n));
-      this.counts[k].parentElement.classList.toggle("bad", n > 0);
-    });
+    this.values.delay.parentElement.hidden = !isLate(health.delay);
+    for (const key of ["n_packets", "n_lost", "n_refused", "n_dropped"]) show(key, whole(health[key]), key !== "n_packets" && health[key] > 0);
   }
 }

@@ -1,18 +1,9 @@
 // Cards of the fingers: state, values, faults and taxel map of each.
 
-import { make, shape, setText } from "../web/dom.js";
-import { fingerColour } from "../web/theme.js";
+import { make, makeButton, setShape, setText, shape } from "../web/dom.js";
+import { number, percent, stateKey, unitWord } from "../web/text.js";
 import { Scale, TaxelMap } from "./taxel_map.js";
-import { debounceNote, distance, faultWord, hasSlipRule, number, percent, reasonWord, shownProbability, slipSpeed, stateKey, stateWord, unitWord } from "./format.js";
-
-// Range of the sigma bar by unit, from noise to a strong slip.
-const SIGMA_RANGES = { count: [1, 1000], N: [1e-3, 1] };
-
-/** Return the filled fraction of a logarithmic bar, from 0 to 1. */
-function logFraction(value, [low, high]) {
-  if (!(value > 0)) return 0;
-  return Math.min(1, Math.max(0, Math.log(value / low) / Math.log(high / low)));
-}
+import { debounceNote, distance, faultWord, hasSlipRule, reasonWord, shownProbability, slipSpeed, stateWord } from "./format.js";
 
 export class Cards {
   /** @param onChoose is called with the name of a finger whose card is clicked. */
@@ -22,17 +13,11 @@ export class Cards {
     this.cards = new Map();
     this.scales = new Map();
     this.frozen = false;
-    this.observer = new ResizeObserver((entries) => {
-      for (const entry of entries) {
-        const card = [...this.cards.values()].find((own) => own.map.canvas.parentElement === entry.target);
-        card?.map.resize(entry.contentRect.width, entry.contentRect.height);
-      }
-    });
     new ResizeObserver(() => this.arrange()).observe(section);
   }
 
   start(hello) {
-    this.observer.disconnect();
+    for (const card of this.cards.values()) card.map.observer.disconnect();
     this.scales.clear();
     const entries = Object.entries(hello.fingers);
     this.cards = new Map(entries.map(([name, sensor], k) => {
@@ -40,7 +25,6 @@ export class Cards {
       return [name, new Card(name, sensor, this.scales.get(sensor.unit), k, hello, () => this.onChoose(name))];
     }));
     this.section.replaceChildren(...[...this.cards.values()].map((card) => card.element));
-    for (const card of this.cards.values()) this.observer.observe(card.map.canvas.parentElement);
     this.arrange();
   }
 
@@ -94,22 +78,16 @@ class Card {
   constructor(name, sensor, scales, index, hello, onChoose) {
     this.sensor = sensor;
     this.hello = hello;
-    const swatch = make("i", "swatch");
-    swatch.style.background = fingerColour(index);
-    swatch.dataset.finger = index;
     this.shape = shape("unknown");
     this.word = make("strong", "word", "UNKNOWN");
     this.reason = make("span", "reason");
-    this.longReason = make("span", "reason long");
     this.slid = make("span", "slid");
     this.speed = make("span", "speed");
     this.slip = make("span", "slips", shape("slip"), make("span", "slips-word", "slips"), this.slid, this.speed);
-    const title = make("span", "name", swatch, make("span", "", name));
+    const title = make("span", "name", name);
     title.title = name;
-    this.head = make("button", "head", this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.longReason, this.slip), this.word));
-    this.head.type = "button";
+    this.head = makeButton("head", onChoose, this.shape, make("span", "head-text", make("span", "top-line", title, this.reason, this.slip), this.word));
     this.head.title = `Plots of ${name} (${index + 1})`;
-    this.head.addEventListener("click", onChoose);
     const canvas = make("canvas");
     canvas.setAttribute("role", "img");
     canvas.setAttribute("aria-label", `Taxel map of ${name}`);
@@ -117,6 +95,7 @@ class Card {
     this.faults = make("ul", "faults");
     this.faults.hidden = true;
     const body = make("div", "body", make("div", "map", canvas), this.makeValues());
+    this.map.observer.observe(canvas.parentElement);
     this.element = make("article", "card", this.head, body, this.faults);
     this.element.setAttribute("aria-label", name);
     this.showState("UNKNOWN", "");
@@ -124,19 +103,21 @@ class Card {
   }
 
   makeValues() {
-    this.probability = meter("stable", "");
+    const { unit } = this.sensor, line = (className, unit, ...label) => {
+      const value = make("b", "", number(null));
+      return [make("div", `value-line ${className}`, ...label, value, make("small", "", unit)), value];
+    };
+    const [probability, sigma, force, ...axes] = [
+      line("", "", "stable"), line("", unitWord(unit), "σ"), line("", unitWord(unit), "|F|"),
+      ...["x", "y", "z"].map((axis) => line("axis", "", make("span", "", "F", make("sub", "", axis)))),
+    ];
+    Object.assign(this, { probability: probability[1], sigma: sigma[1], force: force[1], axes: axes.map(([, value]) => value) });
+    this.fill = make("i", "fill");
     this.mark = make("i", "threshold");
-    this.probability.bar.append(this.mark);
     this.setThreshold(this.sensor.probability_threshold);
-    this.sigma = meter("σ", unitWord(this.sensor.unit));
-    this.sigma.bar.classList.add("log");
-    this.force = make("b", "", number(null));
-    this.axes = ["x", "y", "z"].map((axis) => {
-      const shown = make("span", "", number(null));
-      return { shown, row: make("div", "axis", make("span", "", "F", make("sub", "", axis)), shown) };
-    });
-    const total = make("div", "total", make("span", "", "|F|"), this.force, make("small", "", unitWord(this.sensor.unit)));
-    return make("div", "values", this.probability.box, this.sigma.box, make("div", "force", total, ...this.axes.map(({ row }) => row)));
+    const rows = [probability, sigma, force, ...axes].map(([row]) => row);
+    rows.splice(1, 0, make("div", "meter", this.fill, this.mark));
+    return make("div", "values", ...rows);
   }
 
   /** Move the mark of the threshold from which the finger is stable. */
@@ -147,29 +128,26 @@ class Card {
   }
 
   update(finger, frozen) {
-    const note = debounceNote(finger, this.threshold, this.hello.debounce);
-    this.showState(finger.state, note?.short ?? reasonWord(finger.reason), note?.long);
+    this.showState(finger.state, debounceNote(finger, this.threshold, this.hello.debounce) || reasonWord(finger.reason));
     this.showSlip(hasSlipRule(this.sensor) && finger.cause === "slip" ? finger : null);
     const probability = shownProbability(finger.state, finger.stable_probability);
-    setText(this.probability.value, percent(probability));
-    setBar(this.probability, probability ?? 0);
-    setText(this.sigma.value, number(finger.instability));
-    setBar(this.sigma, logFraction(finger.instability, SIGMA_RANGES[this.sensor.unit] ?? SIGMA_RANGES.count));
-    const force = finger.force ?? [null, null, null], known = force.every((x) => x !== null);
-    setText(this.force, number(known ? Math.hypot(...force) : null));
-    this.axes.forEach(({ shown }, k) => setText(shown, number(force[k])));
+    setText(this.probability, percent(probability));
+    this.fill.style.transform = `scaleX(${(probability ?? 0).toFixed(3)})`;
+    setText(this.sigma, number(finger.instability));
+    const force = finger.force ?? [null, null, null];
+    setText(this.force, number(force.includes(null) ? null : Math.hypot(...force)));
+    this.axes.forEach((value, k) => setText(value, number(force[k])));
     this.showFaults(finger.faults ?? [], finger.faulty_taxels ?? []);
     if (!frozen) this.map.update(finger.taxels, finger.faulty_taxels ?? []);
   }
 
-  showState(state, reason, longReason = reason) {
+  showState(state, reason) {
     const key = stateKey(state);
     setText(this.word, stateWord(state));
     setText(this.reason, reason);
-    setText(this.longReason, longReason);
     if (this.element.dataset.state === key) return;
     this.element.dataset.state = key;
-    this.shape.firstChild.setAttribute("href", `#shape-${key}`);
+    setShape(this.shape, key);
   }
 
   // Say that the finger slides, whatever its state, and how far and how fast, if the model has a
@@ -179,11 +157,8 @@ class Card {
     this.element.classList.toggle("sliding", Boolean(finger));
     const measured = Number.isFinite(finger?.slip_distance);
     this.slip.classList.toggle("measured", measured);
-    const slid = measured ? distance(finger.slip_distance) : "", speed = measured ? slipSpeed(finger.slip_speed) : "";
-    setText(this.slid, slid);
-    setText(this.speed, speed);
-    const decided = "The model's slip rule decided that this finger slides";
-    this.slip.title = measured ? `${decided}: ${slid} since the slip began, now at ${speed}` : decided;
+    setText(this.slid, measured ? distance(finger.slip_distance) : "");
+    setText(this.speed, measured ? slipSpeed(finger.slip_speed) : "");
   }
 
   showFaults(faults, taxels) {
@@ -191,24 +166,11 @@ class Card {
     if (key === this.faultsKey) return;
     this.faultsKey = key;
     const texts = this.hello.faults ?? {}, words = faults.map((fault) => faultWord(fault, texts));
-    if (taxels.length) {
-      const first = taxels.slice(0, 4).join(", ");
-      words.push(`${taxels.length > 1 ? "taxels" : "taxel"} ${first}${taxels.length > 4 ? " …" : ""}`);
-    }
+    if (taxels.length) words.push(`taxel${taxels.length > 1 ? "s" : ""} ${taxels.slice(0, 4).join(", ")}${taxels.length > 4 ? " …" : ""}`);
     // There is room for three; the tooltip has all.
     const shown = words.length > 3 ? [...words.slice(0, 2), `${words.length - 2} more`] : words;
     this.faults.replaceChildren(...shown.map((word) => make("li", "", word)));
     this.faults.title = [words.join("; "), ...faults.map((fault) => texts[fault]?.advice ?? "")].filter(Boolean).join("\n");
     this.faults.hidden = !words.length;
   }
-}
-
-function meter(label, unit) {
-  const value = make("b", "", "–"), fill = make("i", "fill"), bar = make("div", "bar", fill);
-  const box = make("div", "meter", make("div", "line", make("span", "", label), value, make("small", "", unit)), bar);
-  return { box, value, bar, fill };
-}
-
-function setBar({ fill }, fraction) {
-  fill.style.transform = `scaleX(${fraction.toFixed(3)})`;
 }

@@ -1,119 +1,73 @@
-// Buttons for tare, recording, markers and full screen, and the messages about their results.
+// Buttons for tare, recording, markers and full screen. The page disables them without a connection.
 
-import { callService } from "../web/api.js";
-import { byId, make, setText } from "../web/dom.js";
+import { callService } from "../web/connection.js";
+import { byId, runOnce, setText, showToast } from "../web/dom.js";
 import { clock, fileSize } from "./format.js";
 
-const TOAST_TIME = 6000; // [ms]
-const MAX_TOASTS = 4;
 const FLASH_TIME = 400; // [ms], dark and then bright
 // The first callback comes before the page is painted, the second one after it.
 const painted = () => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
-
-/** Show a short message; `kind` is "good" or "bad". */
-export function toast(text, kind) {
-  const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
-  toasts.append(box);
-  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
-  setTimeout(() => box.remove(), TOAST_TIME);
-}
+const pause = (time) => new Promise((done) => setTimeout(done, time));
 
 export class Controls {
   /** @param onMarker is called with the text of each marker that the service accepted. */
   constructor(onMarker) {
     this.onMarker = onMarker;
     this.recording = null;
-    this.canRecord = true;
-    this.connected = false;
     byId("tare").addEventListener("click", () => this.tare());
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
     byId("full").addEventListener("click", () => this.toggleFullScreen());
-    byId("help").addEventListener("click", () => byId("help-box").showModal());
-    // Remove the focus after a click: the space bar then means "pause", not this button again.
-    document.addEventListener("click", (event) => {
-      if (event.detail > 0) event.target.closest?.("button")?.blur();
-    });
-    this.show();
   }
 
-  start(hello) {
-    this.canRecord = hello.can_record !== false;
-    this.show();
+  start({ can_record: canRecord }) {
+    for (const id of ["record", "mark", "marker-text"]) byId(id).disabled = canRecord === false;
+    byId("record").title = canRecord === false ? "This service does not record" : "Start or stop a recording (R)";
   }
 
-  setConnected(connected) {
-    this.connected = connected;
-    this.show();
-  }
-
+  /** Show the progress of a recording, null if there is none. */
   update(recording) {
     this.recording = recording ?? null;
-    this.show();
-  }
-
-  show() {
-    const button = byId("record"), r = this.recording;
-    byId("tare").disabled = !this.connected;
-    button.disabled = !this.connected || !this.canRecord;
-    button.title = this.canRecord ? (r ? r.path : "Start or stop a recording (R)") : "This service does not record";
-    button.setAttribute("aria-pressed", String(r !== null));
-    setText(byId("record-text"), r ? `Stop ${clock(r.seconds)} · ${fileSize(r.n_bytes)}${r.n_dropped > 0 ? ` · ${r.n_dropped} dropped` : ""}` : "Record");
-    byId("mark").disabled = byId("marker-text").disabled = !this.connected || !this.canRecord;
-  }
-
-  // One request of a button at a time: a double click counts once.
-  async request(button, work) {
-    if (button.disabled || button.classList.contains("busy")) return;
-    button.classList.add("busy");
-    try {
-      await work();
-    } catch (error) {
-      toast(error.message, "bad");
-    } finally {
-      button.classList.remove("busy");
-    }
+    const { seconds, n_bytes: n, n_dropped: dropped } = recording ?? {};
+    byId("record").setAttribute("aria-pressed", String(Boolean(recording)));
+    setText(byId("record-text"), recording ? `Stop ${clock(seconds)} · ${fileSize(n)}${dropped > 0 ? ` · ${dropped} dropped` : ""}` : "Record");
   }
 
   tare() {
-    return this.request(byId("tare"), async () => {
+    return runOnce(byId("tare"), async () => {
       await callService("POST", "tare");
-      toast("Taking the tare: nothing may touch the fingers", "good");
+      showToast("Taking the tare: nothing may touch the fingers", "good");
     });
   }
 
   record() {
-    return this.request(byId("record"), async () => {
-      if (this.recording) {
-        const { path, seconds } = await callService("DELETE", "recording");
-        this.update(null);
-        toast(`${clock(seconds ?? 0)} recorded: ${path}`, "good");
-      } else {
-        const { path } = await callService("POST", "recording", {});
-        toast(`Recording to ${path}`, "good");
-      }
+    return runOnce(byId("record"), async () => {
+      const { path, seconds } = await callService(this.recording ? "DELETE" : "POST", "recording", this.recording ? undefined : {});
+      showToast(this.recording ? `${clock(seconds ?? 0)} recorded: ${path}` : `Recording to ${path}`, "good");
+      if (this.recording) this.update(null);
     });
   }
 
+  async addMarker(text, shown = text) {
+    await callService("POST", "markers", { text });
+    this.onMarker(shown);
+  }
+
   mark() {
-    const field = byId("marker-text"), text = field.value.trim();
-    return this.request(byId("mark"), async () => {
-      await callService("POST", "markers", { text: text || "marker" });
-      this.onMarker(text);
-    });
+    const text = byId("marker-text").value.trim();
+    return runOnce(byId("mark"), () => this.addMarker(text || "marker", text));
   }
 
   /** Light up the page for a camera, and mark when: `label auto` then has the offset of its clock. */
   flash() {
-    return this.request(byId("mark"), async () => {
-      const shown = (name) => { document.body.dataset.flash = name; return painted(); };
+    return runOnce(byId("mark"), async () => {
       try {
-        await shown("dark");
-        await new Promise((done) => setTimeout(done, FLASH_TIME));
-        await shown("bright");
-        await callService("POST", "markers", { text: "flash" });
-        this.onMarker("flash");
-        await new Promise((done) => setTimeout(done, FLASH_TIME));
+        document.body.dataset.flash = "dark";
+        await pause(FLASH_TIME);
+        document.body.dataset.flash = "bright";
+        await painted();
+        await this.addMarker("flash");
+        await pause(FLASH_TIME);
       } finally {
         delete document.body.dataset.flash;
       }
@@ -121,8 +75,7 @@ export class Controls {
   }
 
   toggleFullScreen() {
-    const done = document.fullscreenElement
-      ? document.exitFullscreen() : document.documentElement.requestFullscreen();
-    done.catch(() => toast("The browser does not allow full screen here", "bad"));
+    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
+    done.catch(() => showToast("The browser does not allow full screen here", "bad"));
   }
 }

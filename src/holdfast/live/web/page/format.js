@@ -2,11 +2,9 @@
 
 import { NO_VALUE, withSpaces } from "../web/text.js";
 
-export * from "../web/text.js";
-
 // The code of a state in a series is its index in this list.
 export const STATES = ["UNKNOWN", "NO_CONTACT", "UNSTABLE", "STABLE"];
-export const UNKNOWN = 0, NO_CONTACT = 1, UNSTABLE = 2, STABLE = 3;
+export const UNKNOWN = 0;
 
 const REASONS = {
   tare: "taking tare",
@@ -16,10 +14,6 @@ const REASONS = {
   load: "load changes",
   hold: "hold time",
 };
-
-/** Return the key of a state in class names, shapes and colours: "no-contact". */
-export const stateKey = (state) =>
-  STATES.includes(state) ? state.toLowerCase().replace("_", "-") : "unknown";
 
 /** Return whether samples arrive late enough to be worth a colour; as MIN_LATE_DELAY [s]. */
 export const isLate = (seconds) => seconds > 0.1;
@@ -42,23 +36,17 @@ export function share(fraction) {
   return `${Number((100 * fraction).toFixed(digits))}\u202f%`;
 }
 
-/**
- * Return why the state of a finger differs from what its probability says, in few words and in
- * more; null if it does not differ.
- */
+/** Return why the state of a finger differs from what its probability says; "" if it does not. */
 export function debounceNote({ state, reason, stable_probability: probability }, threshold, debounce) {
-  if (!debounce || !Number.isFinite(probability) || reason === "load") return null;
+  if (!debounce || !Number.isFinite(probability) || reason === "load") return "";
   const { hold, hysteresis, min_duration: duration } = debounce, above = probability >= threshold;
+  const waits = duration > 0 ? `waits ${seconds(duration)}` : "";
   if (state === "UNSTABLE" && above) {
-    if (probability < threshold + hysteresis) return note(`from ${share(threshold + hysteresis)}`, `stable from ${share(threshold + hysteresis)}`);
-    if (hold > 0) return note(`held ${seconds(hold)}`, `held for ${seconds(hold)} after the last alarm`);
-    if (duration > 0) return note(`waits ${seconds(duration)}`, `stable when it lasts ${seconds(duration)}`);
+    if (probability < threshold + hysteresis) return `from ${share(threshold + hysteresis)}`;
+    return hold > 0 ? `held ${seconds(hold)}` : waits;
   }
-  if (state === "STABLE" && !above) {
-    if (probability >= threshold - hysteresis) return note(`below ${share(threshold - hysteresis)}`, `unstable below ${share(threshold - hysteresis)}`);
-    if (duration > 0) return note(`waits ${seconds(duration)}`, `unstable when it lasts ${seconds(duration)}`);
-  }
-  return null;
+  if (state !== "STABLE" || above) return "";
+  return probability >= threshold - hysteresis ? `below ${share(threshold - hysteresis)}` : waits;
 }
 
 /** Format a distance that a finger slid [mm]: "0.8 mm", "12 mm". */
@@ -66,23 +54,13 @@ export const distance = (mm) => `${mm.toFixed(mm < 9.95 ? 1 : 0)}\u202fmm`;
 /** Format the speed of a slip [mm/s]: "3.2 mm/s", "85 mm/s". */
 export const slipSpeed = (speed) => `${distance(speed)}/s`;
 
-const note = (short, long) => ({ short, long });
 const seconds = (value) => `${Number(value.toPrecision(2))} s`;
-
-/** Format a duration in few characters: "0.8 s", "12 s", "3 min", "2 h". */
-export function duration(seconds) {
-  if (seconds < 9.95) return `${Math.max(0, seconds).toFixed(1)} s`;
-  if (seconds < 99.5) return `${seconds.toFixed(0)} s`;
-  if (seconds < 5970) return `${Math.round(seconds / 60)} min`;
-  return `${Math.round(seconds / 3600)} h`;
-}
 
 /** Format a latency: "0.21 ms", "12 ms", "1.3 s". */
 export function latency(seconds) {
-  if (seconds === null || seconds === undefined) return NO_VALUE;
-  if (seconds >= 1) return `${seconds.toFixed(1)} s`;
+  if (!Number.isFinite(seconds)) return NO_VALUE;
   const ms = 1000 * seconds;
-  return `${ms < 0.995 ? ms.toFixed(2) : ms < 9.95 ? ms.toFixed(1) : ms.toFixed(0)} ms`;
+  return ms >= 1000 ? `${seconds.toFixed(1)} s` : `${ms.toFixed(ms < 0.995 ? 2 : ms < 9.95 ? 1 : 0)} ms`;
 }
 
 /** Format an elapsed time as a clock: "0:07", "1:02:03". */

@@ -74,15 +74,28 @@ function spacing(points) {
   return Number.isFinite(least) ? least : 1e-3;
 }
 
-// Return a square grid for sensors without positions (all taxels at one point).
+// Return a square grid for sensors without positions (all taxels at one point). Else push points
+// apart that are much closer than most, so that no disc hides another.
 function spreadOut(points) {
-  const extent = Math.max(...[0, 1].map((axis) => {
+  const n = points.length, [width, height] = [0, 1].map((axis) => {
     const values = points.map((point) => point[axis]);
     return Math.max(...values) - Math.min(...values);
-  }));
-  if (points.length < 2 || spacing(points) > 0.02 * extent) return points;
-  const side = Math.ceil(Math.sqrt(points.length));
-  return points.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
+  });
+  if (n < 2) return points;
+  if (spacing(points) < 1e-3 * Math.max(width, height) || !(width + height)) {
+    const side = Math.ceil(Math.sqrt(n));
+    return points.map((_, k) => [5e-3 * (k % side), -5e-3 * Math.floor(k / side)]);
+  }
+  const least = 0.8 * Math.sqrt((width * height) / n), moved = points.map((point) => [...point]);
+  for (let round = 0; round < 30; round += 1) {
+    moved.forEach((a, k) => moved.slice(k + 1).forEach((b) => {
+      const [x, y] = [b[0] - a[0], b[1] - a[1]], gap = Math.hypot(x, y), push = 0.5 * (least / gap - 1);
+      if (!(gap < least)) return;
+      a[0] -= push * x; a[1] -= push * y;
+      b[0] += push * x; b[1] += push * y;
+    }));
+  }
+  return moved;
 }
 
 /** Rotate a reading from the taxel frame to (right, up, normal) of the map. */

@@ -1,22 +1,21 @@
 // Connects the parts of the page: messages arrive at the service's pace, drawing follows the
 // browser's.
 
-import { byId, fillChoice, make, setPressed, setText } from "../web/dom.js";
+import { Connection } from "../web/connection.js";
+import { byId, fillChoice, make, setPressed, setText, showAlert, swatch } from "../web/dom.js";
+import { listenToKeys } from "../web/help.js";
 import { fingerColour, onTheme } from "../web/theme.js";
-import { HandBanner, HealthLine, showAlert } from "./banner.js";
+import { HandBanner, HealthLine } from "./banner.js";
 import { Cards } from "./cards.js";
-import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
-import { STATES, duration, hasSlipRule } from "./format.js";
-import { FrameLimiter } from "./frame_rate.js";
-import { listenToKeys } from "./keys.js";
+import { STATES, hasSlipRule } from "./format.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
 import { SampleStore, capacityFor } from "./store.js";
 import { ThresholdPanel } from "./threshold.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
-const AGE_INTERVAL = 250; // [ms] between two updates of the ages in the event log
+const MAX_DRAW_TIME = 1000; // [ms]; a longer time means that the tab was hidden
 
 class Page {
   constructor() {
@@ -33,24 +32,34 @@ class Page {
     this.store = null;
     this.frozen = null; // a copy of the store while the plots are paused
     this.dirty = false;
-    this.limiter = new FrameLimiter();
-    this.agesUpdatedAt = -Infinity;
-    fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, label: `${value} s`, title: `Show ${value} seconds` })),
+    this.drawnAt = this.nextDrawing = null; // [ms]
+    fillChoice(byId("windows"), WINDOWS.map((value) => ({ value, title: `Show ${value} seconds`, content: [`${value} s`] })),
       this.plots.window, (value) => this.setWindow(value));
     byId("pause").addEventListener("click", () => this.togglePause());
-    listenToKeys({
-      " ": () => this.togglePause(), t: () => this.controls.tare(), r: () => this.controls.record(),
-      m: () => this.controls.mark(), l: () => this.controls.flash(), f: () => this.controls.toggleFullScreen(), "?": () => byId("help").click(),
-      p: () => this.threshold.toggle(), k: () => this.togglePause(),
-      digit: (n) => this.chooseFinger(n ? this.plots.names?.[n - 1] ?? this.plots.chosen : null),
-    });
-    onTheme(() => this.updateColours());
-    this.connection = new Connection({
+    listenToKeys({ "Keyboard shortcuts": this.keys() });
+    onTheme(() => { this.redrawPlots(); this.cards.draw(); });
+    this.connection = new Connection("api/v1/live", "holdfast.live/1", {
       hello: (message) => this.start(message),
       live: (message) => this.update(message),
       state: (link, reason) => this.setLink(link, reason),
     });
-    requestAnimationFrame(() => this.draw());
+    requestAnimationFrame((now) => this.draw(now));
+  }
+
+  keys() {
+    const fingers = Array.from({ length: 9 }, (_, k) => [k + 1, () => this.chooseFinger(this.plots.names?.[k] ?? this.plots.chosen)]);
+    const pause = () => this.togglePause(), { controls } = this;
+    return [
+      ["Space K", "pause plots and maps", { " ": pause, k: pause }],
+      ["1 – 9", "show the plots of this finger", Object.fromEntries(fingers)],
+      ["0", "show the plots of all fingers", { 0: () => this.chooseFinger(null) }],
+      ["T", "take a new tare", { t: () => controls.tare() }],
+      ["P", "show or hide the threshold", { p: () => this.threshold.toggle() }],
+      ["R", "start or stop a recording", { r: () => controls.record() }],
+      ["M", "add a marker with the text of the field", { m: () => controls.mark() }],
+      ["L", "light up the page for a camera, and mark when", { l: () => controls.flash() }],
+      ["F", "full screen", { f: () => controls.toggleFullScreen() }],
+    ];
   }
 
   start(hello) {
@@ -62,16 +71,10 @@ class Page {
     this.events.clear();
     for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
     this.plots.start(hello, this.store);
-    const hasSlips = Object.values(hello.fingers).some(hasSlipRule);
-    document.body.classList.toggle("has-slips", hasSlips);
-    byId("slip-help").hidden = !hasSlips;
+    document.body.classList.toggle("has-slips", Object.values(hello.fingers).some(hasSlipRule));
     this.fillFingers();
     this.showStream(hello);
-    this.showAdvice(hello.advice ?? []);
-  }
-
-  showAdvice(texts) {
-    for (const text of texts.filter((one) => !this.advised.has(one))) {
+    for (const text of (hello.advice ?? []).filter((advice) => !this.advised.has(advice))) {
       this.advised.add(text);
       this.notices.add({ time: Date.now() / 1000, text });
     }
@@ -79,18 +82,15 @@ class Page {
 
   update(message) {
     if (!this.store) return;
-    this.status.ended = Boolean(message.ended);
-    this.status.silent = Boolean(message.health?.silent);
-    this.status.problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
+    const problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
+    Object.assign(this.status, { ended: Boolean(message.ended), silent: Boolean(message.health?.silent), problem });
     this.plots.thresholds = message.thresholds ?? {};
     this.threshold.update(message.thresholds);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
-    const { ended, silent } = this.status;
     // An old STABLE must not look like a current one.
-    const pause = this.restarts ? "NEXT GRASP" : "NO SAMPLES";
-    if (ended || silent) this.banner.showState("UNKNOWN", ended ? "SOURCE ENDED" : pause);
-    else this.banner.showState(message.hand);
+    const { ended, silent } = this.status, word = ended ? "SOURCE ENDED" : this.restarts ? "NEXT GRASP" : "NO SAMPLES";
+    this.banner.showState(ended || silent ? "UNKNOWN" : message.hand, ended || silent ? word : undefined);
     this.cards.setOutdated(ended || silent);
     this.cards.update(message);
     for (const event of message.events ?? []) this.events.add(event);
@@ -106,8 +106,7 @@ class Page {
     // The reason of a refusal stays visible during further attempts.
     if (link === "lost" && this.status.link === "refused") return;
     Object.assign(this.status, { link, reason });
-    this.controls.setConnected(link === "open");
-    this.threshold.setConnected(link === "open");
+    for (const id of ["actions", "threshold-panel"]) byId(id).disabled = link !== "open";
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -117,31 +116,29 @@ class Page {
 
   showLink() {
     const { link, reason, ended, silent, problem } = this.status, open = link === "open";
-    showAlert(
+    showAlert([
       link === "refused" && `Not connected: ${reason}`,
       link === "lost" && "Connection lost, trying again …",
       open && ended && "Source ended: these are its last values",
       open && silent && !this.restarts && "No samples from the source",
       open && problem,
-    );
+    ].find(Boolean) || "");
     const words = { connecting: "connecting", open: ended ? "source ended" : "connected", lost: "connection lost", refused: "not connected" };
     this.health.showConnection(open && (ended || silent) ? "quiet" : link, words[link]);
   }
 
-  draw() {
-    requestAnimationFrame(() => this.draw());
-    if (!this.limiter.mayDraw() || !this.store || !this.dirty) return;
+  // Drawing takes at most half of the browser's time: scripts, layout and painting up to the next frame.
+  draw(now) {
+    requestAnimationFrame((next) => this.draw(next));
+    if (this.drawnAt !== null) this.nextDrawing = now + Math.min(MAX_DRAW_TIME, now - this.drawnAt);
+    this.drawnAt = null;
+    // Half a frame too early is better than a whole frame too late.
+    if (!this.store || !this.dirty || now < this.nextDrawing - 8) return;
     this.dirty = false;
-    this.limiter.startDrawing();
-    if (!this.frozen) {
-      this.cards.draw();
-      if (this.store.end) this.plots.draw(this.store);
-    } else if (Number.isFinite(this.now)) {
-      setText(byId("paused"), `PAUSED · ${duration(this.now - this.frozen.latest)} ago`);
-    }
-    if (performance.now() - this.agesUpdatedAt < AGE_INTERVAL) return;
-    this.agesUpdatedAt = performance.now();
-    this.events.updateAges(this.now);
+    this.drawnAt = now;
+    if (this.frozen) return;
+    this.cards.draw();
+    this.redrawPlots();
   }
 
   togglePause() {
@@ -151,24 +148,22 @@ class Page {
     button.setAttribute("aria-pressed", String(paused));
     setText(button, paused ? "Resume" : "Pause");
     byId("paused").hidden = !paused;
-    document.body.classList.toggle("is-paused", paused);
     this.cards.setFrozen(paused);
     this.dirty = true;
   }
 
   setWindow(seconds) {
-    this.plots.window = seconds;
-    if (this.store) this.plots.build();
+    if (!this.store) return;
     setPressed(byId("windows"), seconds);
+    this.plots.show(this.plots.chosen, seconds);
     this.redrawPlots();
   }
 
   chooseFinger(name) {
     if (!this.store || name === this.plots.chosen) return;
-    this.plots.chosen = name;
     setPressed(byId("fingers"), name ?? "");
     this.cards.choose(name);
-    this.plots.build();
+    this.plots.show(name, this.plots.window);
     this.redrawPlots();
   }
 
@@ -178,13 +173,10 @@ class Page {
   }
 
   fillFingers() {
-    const swatch = (k) => {
-      const mark = make("i", "swatch");
-      mark.style.background = fingerColour(k);
-      return mark;
-    };
-    const fingers = this.plots.names.map((name, k) => ({ value: name, label: name, title: `Plots of ${name} (${k + 1})`, mark: swatch(k) }));
-    fillChoice(byId("fingers"), [{ value: "", label: "all", title: "Plots of all fingers (0)" }, ...fingers],
+    const fingers = this.plots.names.map((name, k) => ({
+      value: name, title: `Plots of ${name} (${k + 1})`, content: [swatch(fingerColour(k)), make("span", "", name)],
+    }));
+    fillChoice(byId("fingers"), [{ value: "", title: "Plots of all fingers (0)", content: ["all"] }, ...fingers],
       this.plots.chosen ?? "", (name) => this.chooseFinger(name || null));
     this.cards.choose(this.plots.chosen);
   }
@@ -192,26 +184,16 @@ class Page {
   addMarker(text) {
     if (!Number.isFinite(this.now)) return;
     this.plots.addMarker(this.now);
-    this.events.addMarker(this.now, text);
+    this.events.addEvent("marker", text);
   }
 
   showStream(hello) {
-    const modules = Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", ");
-    const sensors = [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", ");
     const rows = {
-      model: hello.model, source: hello.source, sensors, rate: hello.rate ? `${hello.rate} Hz` : "not known",
-      "modules (taxels)": modules, since: new Date(1000 * hello.started).toLocaleString("en-GB"),
+      model: hello.model, source: hello.source, rate: hello.rate ? `${hello.rate} Hz` : "not known",
+      sensors: [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", "),
+      "modules (taxels)": Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", "),
     };
     byId("stream").replaceChildren(...Object.entries(rows).flatMap(([name, value]) => [make("dt", "", name), make("dd", "", String(value))]));
-  }
-
-  updateColours() {
-    if (!this.store) return;
-    document.querySelectorAll(".card .swatch").forEach((mark) => { mark.style.background = fingerColour(Number(mark.dataset.finger)); });
-    this.fillFingers();
-    this.plots.build();
-    this.redrawPlots();
-    this.cards.draw();
   }
 }
 

@@ -1,5 +1,6 @@
 // Samples of the last minute, in memory of constant size.
 
+import { indexAt } from "../web/store.js";
 import { STATES, UNKNOWN, shownProbability } from "./format.js";
 
 const SECONDS = 60;
@@ -31,34 +32,20 @@ export class SampleStore {
   get start() { return Math.max(0, this.end - this.capacity); }
   get latest() { return this.end ? this.times[this.end - 1] : null; }
 
-  arrays() {
-    return [this.times, this.hand, ...[...this.fingers.values()].flatMap((columns) => Object.values(columns))];
-  }
+  arrays() { return [this.times, this.hand, ...[...this.fingers.values()].flatMap((columns) => Object.values(columns))]; }
 
   /** Append the samples of a message; `hand` is the code of the hand's state. */
-  append(series, hand, maxGap) {
-    const times = series.times, last = this.latest;
+  append({ times, fingers }, hand, maxGap) {
+    const last = this.latest;
     if (!times.length) return;
     // Times that go back mean a restarted source: a replay in a loop, or another clock. A source
     // that falls silent gives an estimate at the time of its last sample: the samples stay.
     if (last !== null && times[0] < last) this.clear();
-    else if (last !== null && times[0] - last > maxGap) this.appendGap(0.5 * (last + times[0]));
+    // A sample without values breaks the lines of the plots.
+    else if (last !== null && times[0] - last > maxGap) this.appendSample(0.5 * (last + times[0]), UNKNOWN, {}, 0, 0);
     const skipped = Math.max(0, times.length - this.capacity);
     this.removed += skipped;
-    for (let k = skipped; k < times.length; k += 1) {
-      const index = this.appendTime(times[k], hand);
-      for (const [name, columns] of this.fingers) {
-        const from = series.fingers[name];
-        if (from?.state?.[k] === null && this.hasRecentSample(name, times[k], index, maxGap)) repeatPrevious(columns, index);
-        else writeSample(columns, index, from, k);
-        if (typeof from?.state?.[k] === "number") this.lastTimes.set(name, times[k]);
-      }
-    }
-  }
-
-  // Fingers may be sampled at different times: between its samples a finger keeps its values.
-  hasRecentSample(name, time, index, maxGap) {
-    return index > 0 && time - (this.lastTimes.get(name) ?? -Infinity) < maxGap;
+    for (let k = skipped; k < times.length; k += 1) this.appendSample(times[k], hand, fingers, k, maxGap);
   }
 
   clear() {
@@ -66,66 +53,38 @@ export class SampleStore {
     this.lastTimes.clear();
   }
 
-  // Append a sample without values, which breaks the lines of the plots.
-  appendGap(time) {
-    const index = this.appendTime(time, UNKNOWN);
-    for (const columns of this.fingers.values()) writeSample(columns, index, undefined, 0);
-  }
-
-  appendTime(time, hand) {
+  appendSample(time, hand, fingers, k, maxGap) {
     if (this.end === this.times.length) {
       const from = this.end - this.capacity;
       for (const array of this.arrays()) array.copyWithin(0, from);
       this.end = this.capacity;
       this.removed += from;
     }
-    this.times[this.end] = time;
-    this.hand[this.end] = hand;
-    this.end += 1;
-    return this.end - 1;
+    const index = this.end++;
+    this.times[index] = time;
+    this.hand[index] = hand;
+    for (const [name, columns] of this.fingers) {
+      const series = fingers[name], state = series?.state?.[k];
+      // Fingers may be sampled at different times: between its samples a finger keeps its values.
+      const isBetween = state === null && index > 0 && time - (this.lastTimes.get(name) ?? -Infinity) < maxGap;
+      const sample = isBetween ? null : sampleOf(series, k);
+      for (const key of Object.keys(columns)) columns[key][index] = sample ? sample[key] : columns[key][index - 1];
+      if (typeof state === "number") this.lastTimes.set(name, time);
+    }
   }
 
   /** Return a copy, for plots that are paused. */
-  copy() {
-    const copy = new SampleStore([], 0);
-    Object.assign(copy, { capacity: this.capacity, end: this.end, removed: this.removed });
-    copy.times = this.times.slice();
-    copy.hand = this.hand.slice();
-    copy.fingers = new Map([...this.fingers].map(([name, columns]) => [
-      name, Object.fromEntries(Object.entries(columns).map(([key, array]) => [key, array.slice()])),
-    ]));
-    return copy;
-  }
-
-  /** Return the index of the first stored sample that is not before `time`. */
-  indexOf(time) {
-    let low = this.start, high = this.end;
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.times[middle] < time) low = middle + 1;
-      else high = middle;
-    }
-    return low;
-  }
+  copy() { return Object.assign(new SampleStore([], 0), structuredClone({ ...this })); }
 }
 
-function repeatPrevious(columns, index) {
-  for (const array of Object.values(columns)) array[index] = array[index - 1];
-}
-
-const value = (values, k) => values?.[k] ?? NaN;
-
-function writeSample(columns, index, from, k) {
-  const [x, y, z] = [0, 1, 2].map((axis) => value(from?.force?.[axis], k));
-  columns.fx[index] = x;
-  columns.fy[index] = y;
-  columns.fz[index] = z;
-  columns.force[index] = Math.sqrt(x * x + y * y + z * z);
-  columns.sigma[index] = value(from?.instability, k);
-  columns.state[index] = from?.state?.[k] ?? UNKNOWN;
-  const state = STATES[columns.state[index]];
-  columns.probability[index] = shownProbability(state, from?.stable_probability?.[k]) ?? NaN;
-  columns.slip[index] = shownProbability(state, from?.slip_probability?.[k]) ?? NaN;
+function sampleOf(series, k) {
+  const value = (values) => values?.[k] ?? NaN;
+  const [fx, fy, fz] = [0, 1, 2].map((axis) => value(series?.force?.[axis])), state = series?.state?.[k] ?? UNKNOWN;
+  const shown = (values) => shownProbability(STATES[state], values?.[k]) ?? NaN;
+  return {
+    fx, fy, fz, force: Math.hypot(fx, fy, fz), sigma: value(series?.instability), state,
+    probability: shown(series?.stable_probability), slip: shown(series?.slip_probability),
+  };
 }
 
 /**
@@ -141,22 +100,17 @@ function writeSample(columns, index, from, k) {
  */
 export function downsample(store, window, bins, arrays) {
   const now = store.latest ?? 0;
-  const first = Math.max(store.start, store.indexOf(now - window) - 1);
+  const first = Math.max(store.start, indexAt(store.times, now - window, store.start, store.end) - 1);
   const stride = 2 ** Math.max(0, Math.ceil(Math.log2((store.end - first) / bins)));
-  const x = [], indices = [], columns = arrays.map(() => []);
+  const indices = [], columns = arrays.map(() => []);
   let start = stride === 1 ? first : Math.ceil((first + store.removed) / stride) * stride - store.removed;
   for (; start < store.end; start += stride) {
     const stop = Math.min(start + stride, store.end), middle = start + (stride >> 1);
-    x.push(store.times[start] - now);
-    indices.push(start);
-    const two = stride > 1 && middle < stop;
-    if (two) { x.push(store.times[middle] - now); indices.push(middle); }
-    arrays.forEach((array, c) => {
-      if (two) columns[c].push(...extremes(array, start, stop));
-      else columns[c].push(Number.isNaN(array[start]) ? null : array[start]);
-    });
+    const isPair = stride > 1 && middle < stop;
+    indices.push(start, ...(isPair ? [middle] : []));
+    arrays.forEach((array, c) => columns[c].push(...(isPair ? extremes(array, start, stop) : [Number.isNaN(array[start]) ? null : array[start]])));
   }
-  return { x, columns, indices };
+  return { x: indices.map((index) => store.times[index] - now), columns, indices };
 }
 
 // Return the smallest and the largest value in their order; a missing value breaks the line.

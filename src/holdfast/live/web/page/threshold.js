@@ -1,15 +1,9 @@
 // Panel with the threshold of the probability: the expected errors, and the live detector's value.
 
-import { callService } from "../web/api.js";
-import { byId, setText } from "../web/dom.js";
-import { toast } from "./controls.js";
-import { number, share } from "./format.js";
-
-/** Return the point of the validation that is nearest to a threshold; null if there is none. */
-function nearestPoint(points, threshold) {
-  const distance = (point) => Math.abs(point.threshold - threshold);
-  return points.reduce((best, point) => (best === null || distance(point) < distance(best) ? point : best), null);
-}
+import { callService } from "../web/connection.js";
+import { byId, setText, showToast } from "../web/dom.js";
+import { number } from "../web/text.js";
+import { share } from "./format.js";
 
 /** Return the probability of log odds; five digits, as `holdfast tune` has them. */
 const probabilityOf = (logOdds) => Number((1 / (1 + Math.exp(-logOdds))).toPrecision(5));
@@ -19,7 +13,8 @@ const logOddsOf = (probability) => Math.max(-8, Math.min(8, Math.log(probability
 
 /** Return what the validation of the model expects at a threshold, as a sentence. */
 function expectation(points, threshold) {
-  const point = nearestPoint(points, threshold);
+  const distance = (point) => Math.abs(point.threshold - threshold);
+  const point = points.reduce((best, other) => (best && distance(best) <= distance(other) ? best : other), null);
   if (point === null) return "The errors to expect are not known: holdfast tune adds them to the model.";
   const missed = point.missed === null ? "" : `, ${number(point.missed).replace(/\.?0+$/, "")}\u202f% of events missed`;
   return `Expected at ${share(point.threshold)}: ${number(point.false_alarms_per_minute)} false alarms a minute${missed} (measured by holdfast tune)`;
@@ -34,11 +29,7 @@ function thresholdWord(values) {
 export class ThresholdPanel {
   constructor() {
     this.slider = byId("threshold");
-    this.own = []; // of the model, by finger
-    this.points = [];
-    this.values = [];
     this.moving = false; // the user moves the slider, or the service has not answered yet
-    this.connected = false;
     byId("threshold-toggle").addEventListener("click", () => this.toggle());
     this.slider.addEventListener("input", () => { this.moving = true; this.showValue([this.chosen]); });
     this.slider.addEventListener("change", () => this.send("POST", { value: this.chosen }));
@@ -51,59 +42,40 @@ export class ThresholdPanel {
   get chosen() { return probabilityOf(Number(this.slider.value)); }
 
   start(hello) {
-    this.own = Object.values(hello.fingers).map((finger) => finger.probability_threshold);
+    this.own = Object.values(hello.fingers).map((finger) => finger.probability_threshold); // of the model
     this.points = hello.operating_points ?? [];
     setText(byId("threshold-own"), `Model: ${thresholdWord(this.own)}`);
     this.update();
   }
 
-  setConnected(connected) {
-    this.connected = connected;
-    this.show();
-  }
-
   /** Show the thresholds of the fingers of the live detector. */
-  update(thresholds) {
-    const values = Object.values(thresholds ?? {});
-    this.values = values.length ? values : this.own;
+  update(thresholds = {}) {
     if (this.moving) return;
-    const middle = this.values.reduce((sum, value) => sum + value, 0) / this.values.length;
+    const own = Object.values(thresholds), values = own.length ? own : this.own;
+    const middle = values.reduce((sum, value) => sum + value, 0) / values.length;
     if (middle !== this.middle) this.slider.value = String(logOddsOf(middle));
     this.middle = middle;
-    this.showValue(this.values);
-    this.show();
+    this.showValue(values);
+    byId("threshold-own").disabled = values.every((value, k) => value === this.own[k]);
   }
 
   showValue(values) {
-    const word = thresholdWord(values);
-    setText(byId("threshold-value"), word);
-    setText(byId("threshold-now"), word);
+    const word = thresholdWord(values), differ = new Set(values).size > 1;
+    for (const id of ["threshold-value", "threshold-now"]) setText(byId(id), word);
     this.slider.setAttribute("aria-valuetext", word);
-    const errors = values.length === 1 || new Set(values).size === 1
-      ? expectation(this.points, values[0]) : "The fingers have different thresholds.";
-    setText(byId("threshold-expected"), errors);
-  }
-
-  show() {
-    this.slider.disabled = !this.connected;
-    byId("threshold-own").disabled = !this.connected || this.values.every((value, k) => value === this.own[k]);
+    setText(byId("threshold-expected"), differ ? "The fingers have different thresholds." : expectation(this.points, values[0]));
   }
 
   async send(method, body) {
     this.moving = true;
-    try {
-      await callService(method, "threshold", body);
-    } catch (error) {
-      toast(error.message, "bad");
-    } finally {
-      this.moving = false;
-      this.middle = null; // show the service's value, whatever it is
-    }
+    await callService(method, "threshold", body).catch((error) => showToast(error.message, "bad"));
+    this.moving = false;
+    this.middle = null; // show the service's value, whatever it is
   }
 
   toggle() {
     const panel = byId("threshold-panel");
     panel.hidden = !panel.hidden;
-    byId("threshold-toggle").setAttribute("aria-expanded", String(!panel.hidden));
+    byId("threshold-toggle").setAttribute("aria-pressed", String(!panel.hidden));
   }
 }

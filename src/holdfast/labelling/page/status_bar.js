@@ -1,26 +1,9 @@
-// Messages to the person who labels: alert, toasts, and the status bar.
+// Status bar: whether the labels are saved, the item that keys act on, and the time window.
 
 import { byId, make, setText, shape } from "../web/dom.js";
-import { dateText, labelText, percent, spanText, stateKey, timeText } from "./format.js";
+import { percent, stateKey, timeText } from "../web/text.js";
+import { dateText, labelText, spanText } from "./format.js";
 import { LOW_CONFIDENCE } from "./labels.js";
-
-const TOAST_DURATION = 6000; // [ms]
-const MAX_TOASTS = 4;
-
-/** Show a short message for a few seconds; `kind` is "good" or "bad". */
-export function showToast(text, kind) {
-  const box = make("p", `toast ${kind}`, text), toasts = byId("toasts");
-  toasts.append(box);
-  while (toasts.children.length > MAX_TOASTS) toasts.firstElementChild.remove();
-  setTimeout(() => box.remove(), TOAST_DURATION);
-}
-
-/** Show a line above the page until it is replaced; an empty text hides it. */
-export function showAlert(text) {
-  const box = byId("alert");
-  if (box.textContent !== text) box.textContent = text;
-  box.hidden = !text;
-}
 
 const SAVE_TEXTS = {
   saving: "saving …", waiting: "not saved yet …", none: "no labels yet",
@@ -48,33 +31,23 @@ export class SaveStatus {
   }
 }
 
-const HINTS = {
-  proposal: "Enter accepts, X rejects", label: "Enter confirms the label", fresh: "A copies the label to all fingers",
-};
-
-// Return the hint for an item of the status bar.
-function hintFor(kind, item, fresh) {
-  if (kind !== "selected") return HINTS[kind];
-  if (fresh) return HINTS.fresh;
-  return item.confidence < LOW_CONFIDENCE ? HINTS.label : "";
-}
+const HINTS = { proposal: "Enter accepts, X rejects", label: "Enter confirms the label", fresh: "A copies the label to all fingers" };
 
 /** Show the selected label, or else the target of Enter and X, in the status bar. */
 export function showItem(editor, target) {
-  const box = byId("item"), { selected } = editor;
+  const box = byId("item"), { selected, readOnly } = editor;
   const showsTarget = !selected || (target && (selected.fresh || target.kind !== "proposal"));
-  const shown = showsTarget ? target : { kind: "selected", finger: selected.finger, item: selected.label };
-  if (!shown) {
-    box.replaceChildren(make("span", "hint", editor.readOnly ? "" : "Drag over a finger to label it · ? shows all keys"));
-    return;
+  const { kind, finger, item } = (showsTarget ? target : { kind: "selected", finger: selected.finger, item: selected.label }) ?? {};
+  const doubt = kind === "selected" && item.confidence < LOW_CONFIDENCE ? "label" : kind;
+  const hint = item ? HINTS[kind === "selected" && selected.fresh ? "fresh" : doubt] : "Drag over a finger to label it · ? shows all keys";
+  box.replaceChildren();
+  if (item) {
+    const facts = [finger, spanText(item), item.confidence < 1 ? percent(item.confidence) : "", item.author, item.evidence].filter(Boolean).join(" · ");
+    box.dataset.state = stateKey(item.state);
+    box.title = facts;
+    box.append(shape(stateKey(item.state)), make("b", "", `${kind === "proposal" ? "proposed: " : ""}${labelText(item)}`), make("span", "facts", facts));
   }
-  const { kind, finger, item } = shown, key = stateKey(item.state);
-  const confidence = item.confidence < 1 ? percent(item.confidence) : "";
-  const facts = [finger, spanText(item), confidence, item.author, item.evidence].filter(Boolean).join(" · ");
-  const hint = editor.readOnly ? "" : hintFor(kind, item, selected?.fresh);
-  box.replaceChildren(shape(key), make("b", "", `${kind === "proposal" ? "proposed: " : ""}${labelText(item)}`), make("span", "facts", facts), make("span", "hint", hint));
-  box.dataset.state = key;
-  box.title = facts;
+  if (!readOnly) box.append(make("span", "hint", hint ?? ""));
 }
 
 /** Show the time window, and whether every sample is drawn. */
