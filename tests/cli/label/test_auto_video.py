@@ -1,11 +1,13 @@
 """`holdfast label auto tracking` with a video; its content is that of a test."""
 
+import re
+
 import numpy as np
 import pytest
 
 from holdfast.io import load_labels, save_recording
 from holdfast.labelling.rules import video
-from labelling.rules.test_video import SLIPS, recording, sticker_track
+from labelling.rules.test_video import BAD_FILMS, SLIPS, recording, sticker_track
 
 from .helpers import refusal, run, run_json
 
@@ -51,3 +53,15 @@ def test_options_that_do_not_fit(capsys, pulls):
     assert "'/aruco'" in refusal(capsys, "auto", "tracking", path, *words)
     path.with_suffix(".mp4").unlink()
     assert "--video FILE" in refusal(capsys, "auto", "tracking", path, "--fps", 30)
+
+
+@pytest.mark.parametrize("case", ["hidden", "other time"])
+def test_a_film_that_shows_no_slips_is_one_line_and_labels_nothing(
+    capsys, pulls, monkeypatch, case
+):
+    path, _ = pulls
+    made, message = BAD_FILMS[case]
+    times, found = made()
+    monkeypatch.setattr(video, "read_stickers", lambda *_: (times, np.zeros(len(times)), found))
+    assert re.search(message, refusal(capsys, "auto", "tracking", path))
+    assert not path.with_name("pulls.labels.json").exists()

@@ -84,18 +84,24 @@ def test_each_grasp_is_recorded_with_its_markers_and_labels(lead):
     assert begin > 1.5  # the open hand is in it
 
 
-def test_what_was_stopped_goes_on_at_its_step(lead):
-    def stops(protocol):
-        in_tap = protocol.step is TAP and protocol.stage is Stage.ACT
-        return ["quit"] if in_tap else goes_on(protocol)
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_what_was_stopped_goes_on_at_its_step(lead, number):
+    steps = (OPEN, HOLD, TAP)
+    broken = steps[number - 1]
 
-    with pytest.raises(TrainingError, match=r"2 of 3 grasps are in .*/grasps: .* --resume$"):
-        lead(stops, OPEN, HOLD, TAP)
-    folder = lead(goes_on, OPEN, HOLD, TAP, resume=True)
+    def stops(protocol):
+        inside = protocol.step is broken and protocol.stage is Stage.ACT
+        return ["quit"] if inside else goes_on(protocol)
+
+    kept = rf"{number - 1} of 3 grasps are in .*/grasps: .* --resume$"
+    with pytest.raises(TrainingError, match=kept):
+        lead(stops, *steps)
+    folder = lead(goes_on, *steps, resume=True)
     assert [x.name for x in folder.kept] == ["open", "hold", "tap"]
-    # Nothing is lost: what was recorded of the tap is aside.
-    assert [path.name for path in folder.aside.glob("*.mcap")] == ["003-tap.mcap"]
-    assert load_recording(folder.aside / "003-tap.mcap").complete
+    # Nothing is lost: what was recorded of the broken step is aside.
+    name = f"00{number}-{broken.name}"
+    assert [path.stem for path in folder.aside.glob("*.mcap")] == [name]
+    assert load_recording(folder.aside / f"{name}.mcap").complete
     assert folder.results[-1].recording == "004-tap"
 
 
