@@ -24,7 +24,7 @@ import numpy as np
 
 from holdfast.detection import Model
 from holdfast.io import load_recording
-from holdfast.metrics.slip_curves import SLIP_THRESHOLDS, ThresholdChoice, choose_threshold
+from holdfast.metrics.slip_curves import SLIP_THRESHOLDS, choose_threshold
 from holdfast.metrics.slip_truth import SlipDecisions
 from holdfast.metrics.slips import SlipCounter, SlipCounts, SlipMetrics, slip_metrics
 from holdfast.parallel import Engine
@@ -117,7 +117,7 @@ def curve(
 
 
 def rival_threshold(handling: Sequence[Recording], scores: Scores, model: Model) -> float:
-    index = choose_threshold(curve(handling, scores, model, SLIP_THRESHOLDS), ThresholdChoice(1.0))
+    index = choose_threshold(curve(handling, scores, model, SLIP_THRESHOLDS), 1.0)
     return 1.0 if index is None else float(SLIP_THRESHOLDS[index])
 
 
@@ -134,7 +134,7 @@ def row(part: str, name: str, metrics: SlipMetrics) -> str:
 
 def best_threshold(counts: SlipCounts) -> int:
     """Return the index of the lowest threshold with one false alarm a minute on the test itself."""
-    index = choose_threshold(counts, ThresholdChoice(1.0))
+    index = choose_threshold(counts, 1.0)
     return len(counts) - 1 if index is None else index
 
 

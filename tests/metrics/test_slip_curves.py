@@ -5,13 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy import stats
 
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
-    ThresholdChoice,
     choose_threshold,
     held_out_indices,
     slip_curve,
@@ -36,7 +32,7 @@ def random_recording(seed, n_false):
     return SlipDecisions(made.times, probability, made.raised, 0.0, made.truth)
 
 
-CHOICE = ThresholdChoice(1.0)
+CHOICE = 1.0
 
 
 def held_out(curves, groups):
@@ -56,21 +52,11 @@ class TestThresholds:
         assert rates[index - 1] > 1.0
         assert all(rate <= 1.0 for rate in rates[index:])
 
-    def test_false_alarms_are_counted_in_held_time_or_in_quiet_hold_alone(self):
-        total = SlipCounts.total(self.curves)
-        pushed = replace(total, false_held=total.false_held + 99)
-        assert choose_threshold(pushed, CHOICE) is None
-        index = choose_threshold(pushed, ThresholdChoice(1.0, "quiet"))
-        rates = [60 * counts.false_quiet / counts.quiet_seconds for counts in total]
-        raised = [counts.raised_seconds / counts.quiet_seconds for counts in total]
-        assert rates[index] <= 1.0
-        assert rates[index - 1] > 1.0 or raised[index - 1] > 0.02
-
     def test_a_summary_has_the_threshold_of_other_recordings_or_of_other_groups(self):
         tested, training = (
             [{"thumb": c} for c in part] for part in (self.curves[:4], self.curves[4:])
         )
-        for choice in (ThresholdChoice(1.0), ThresholdChoice(-1.0)):  # the second allows nothing
+        for choice in (1.0, -1.0):  # the second allows nothing
             index = choose_threshold(SlipCounts.total(self.curves[4:]), choice)
             summary = summarise_choice(tested, choice, training=training)
             assert summary.threshold_chosen and summary.intervals is not None
@@ -79,7 +65,7 @@ class TestThresholds:
         groups = [0, 0, 1, 1]
         indices = held_out(self.curves[:4], groups)
         counts = SlipCounts.total(c[k] for c, k in zip(self.curves, indices, strict=False))
-        summary = summarise_choice(tested, ThresholdChoice(1.0), groups=groups)
+        summary = summarise_choice(tested, 1.0, groups=groups)
         assert summary.pooled == slip_metrics(counts)
 
     def test_a_curve_is_the_counts_at_each_threshold(self):
@@ -153,79 +139,3 @@ class TestThresholds:
 
     def test_no_interval_of_one_recording(self):
         assert slip_intervals(self.curves[:1]) is None
-
-
-def limit(n):
-    """Upper end of the interval of a Poisson number, exceeded in a fifth of the cases."""
-    return float(stats.gamma.ppf(0.8, n + 1))
-
-
-def in_use(curve, rate):
-    return choose_threshold(curve, ThresholdChoice(rate, "use"))
-
-
-class TestRateInUse:
-    @staticmethod
-    def curve(quiet, disturbed, quiet_minutes=6.0, disturbed_minutes=4.0):
-        """Return counts whose false alarms fall by a half from threshold to threshold."""
-        n = len(SLIP_THRESHOLDS)
-        minutes = quiet_minutes + disturbed_minutes
-        falls = 0.5 ** np.arange(n)
-        return replace(
-            SlipCounts.total([]), quiet_seconds=60 * quiet_minutes, held_seconds=60 * minutes,
-            delays=np.empty((n, 0)), gross_delays=np.empty((n, 0)), found_before=np.zeros((n, 2)),
-            false_quiet=quiet * falls, false_held=(quiet + disturbed) * falls,
-            raised_seconds=np.zeros(n), false_impacts=np.zeros(n, dtype=np.int64),
-        )  # fmt: skip
-
-    @pytest.mark.parametrize("counts", [(9.0, 3.0, 6.0, 2.0), (2.0, 16.0, 2.0, 8.0)])
-    def test_quiet_and_disturbed_time_count_with_their_shares_of_use(self, counts):
-        quiet, disturbed, *minutes = counts
-        rate = 0.6 * quiet / minutes[0] + 0.4 * disturbed / minutes[1]
-        rate += (limit(quiet + disturbed) - quiet - disturbed) / sum(minutes)
-        curve = self.curve(*counts)
-        assert [in_use(curve, 1.001 * rate), in_use(curve, 0.999 * rate)] == [0, 1]
-
-    @pytest.mark.parametrize("minutes", [(10.0, 0.0), (0.0, 10.0)])
-    def test_only_one_of_the_two_counts_alone(self, minutes):
-        curve = self.curve(20.0 * (minutes[0] > 0), 20.0 * (minutes[1] > 0), *minutes)
-        assert [in_use(curve, rate * limit(20.0) / 10) for rate in (1.001, 0.999)] == [0, 1]
-
-    def test_what_is_raised_in_quiet_hold_stays_under_two_percent(self):
-        curve = self.curve(0.0, 0.0)
-        raised = np.where(np.arange(len(curve)) < 5, 7.3, 7.1)  # of 360 s
-        assert in_use(replace(curve, raised_seconds=raised), 1.0) == 5
-
-    def test_none_fits(self):
-        assert in_use(self.curve(6.0, 8.0), 1e-80) is None
-        assert in_use(self.curve(0.0, 0.0, 0.0, 0.0), 1.0) is None
-
-    @given(
-        rate=st.floats(0.1, 20.0), seed=st.integers(0, 99),
-        minutes=st.tuples(st.just(0.0) | st.floats(0.1, 9.0), st.floats(0.1, 9.0)),
-    )  # fmt: skip
-    @settings(max_examples=50)
-    def test_as_the_slow_twin(self, rate, seed, minutes):
-        """Its rates go up and down, so that some low thresholds are lucky."""
-        generator, curve = np.random.default_rng(seed), self.curve(20.0, 20.0, *minutes)
-        quiet = curve.false_quiet * generator.uniform(0, 2, len(curve)) * (minutes[0] > 0)
-        disturbed = generator.uniform(0, 40, len(curve)) / np.arange(1, len(curve) + 1)
-        curve = replace(curve, false_quiet=quiet, false_held=quiet + disturbed)
-        # Wilson and Hilferty are within 1 % of the limit of a Poisson number.
-        low, high = (
-            self.slow_index(curve, rate * x, quiet, disturbed, minutes) for x in (0.99, 1.01)
-        )
-        assert (high or 0) <= (in_use(curve, rate) or 0) <= (len(curve) if low is None else low)
-
-    def slow_index(self, curve, rate, quiet, disturbed, minutes):
-        expected = None
-        for k in reversed(range(len(curve))):
-            share = 0.4 if minutes[0] else 1.0
-            found = share * disturbed[k] / minutes[1]
-            if minutes[0]:
-                found += (1 - share) * quiet[k] / minutes[0]
-            n = quiet[k] + disturbed[k]
-            if found + (limit(n) - n) / sum(minutes) > rate:
-                break
-            expected = k
-        return expected

@@ -7,12 +7,9 @@ import pytest
 
 from detection.detector.build import z_of
 from holdfast.detection import detect, parse_features
-from holdfast.detection.heads import Linear
 from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.training import Setting, train
-from holdfast.training.classifiers.fitting import Samples
-from holdfast.training.classifiers.logreg import LogisticRegression
-from holdfast.training.head_fits import MIN_SPEED_SAMPLES, fit_slip, fit_speed
+from holdfast.training.head_fits import MIN_SPEED_SAMPLES, fit_speed
 from holdfast.training.targets import TargetSamples, true_speed
 
 from .build import sliding_recording
@@ -119,20 +116,3 @@ class TestTrain:
         part = plain.fingers["*"]
         assert part.slip.features == part.stable.features
         assert part.head("slip_speed") is None
-
-
-def test_a_prior_is_one_more_feature_of_the_rule():
-    """The head on features alone has the value of a fit to the features and the prior."""
-    rng = np.random.default_rng(1)
-    features = rng.normal([3.0, -1.0], [2.0, 0.5], size=(600, 2))
-    slides = features @ [0.5, 1.0] + rng.normal(size=600) > 1.5
-    units = np.arange(600) % 3
-    samples = TargetSamples(features, slides, units, units, 600)
-    prior = Linear.of(np.array([1.0, 0.5]), np.array([2.0, 4.0]), np.array([0.7, -0.2]), 0.3,
-                      slope=1.5, offset=-0.4)  # fmt: skip
-    head = fit_slip(samples, (), FEATURES, is_any=False, n_min=1, c=0.1, prior=prior)
-    recipe = LogisticRegression()
-    wide = Samples(np.column_stack([features, prior.decision(features)]), slides, units)
-    parameters = {**recipe.reference, "class_weight": None, "C": 0.1}
-    expected = recipe.fit(wide, parameters, 0).rule.decision(wide.features)
-    np.testing.assert_allclose(head.rule.decision(features), expected, rtol=0, atol=1e-9)

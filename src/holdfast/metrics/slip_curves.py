@@ -1,8 +1,8 @@
 """Slips at many thresholds: their counts, the choice of a threshold, intervals with the choice."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import replace
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -32,12 +32,6 @@ SLIP_THRESHOLD_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
 """Those of a slip, which are not below a probability of 0.018."""
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
-
-DISTURBED_SHARE = 0.4
-"""Share of held time in which something pushes or moves the object in use: an assumption, near the
-share in the paper's experiment."""
-UPPER_DEVIATION = 0.84
-"""Standard deviations of the upper end of an interval above which are 20 %."""
 
 MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
@@ -94,37 +88,18 @@ def slip_curve(decisions: SlipDecisions) -> SlipCounts:
     return replace(parts[0], **joined)
 
 
-@dataclass(frozen=True)
-class ThresholdChoice:
-    """Choice of the threshold of slips.
+def choose_threshold(curve: SlipCounts, false_alarms: float) -> int | None:
+    """Return the index in `SLIP_THRESHOLDS` of the choice on a curve.
 
     It is the lowest threshold with few enough false alarms, and a slip reported in at most
     `MAX_RAISED_QUIET` of quiet hold, so long as every higher one fits, too: a lucky low threshold
-    below a bad one is not taken.
+    below a bad one is not taken. It is None if no threshold fits, or nothing is held.
 
-    What is surely held of labelled grasps is disturbed for another share of its time than use is,
-    s = 0.4. So the rate of false alarms in `use` weights the rates of quiet and of disturbed time,
-    and the upper end of its interval, which is exceeded in one case of five, counts:
-
-        rate = (1 - s) rate_quiet + s rate_disturbed + (limit(n) - n) / time
-
-    with the limit of a Poisson number n (Wilson and Hilferty).
-
-    Attributes:
-        false_alarms: maximum number per minute, of one finger.
-        counted_in: all `held` time, pushes and glitches included; `quiet` hold alone; or `use`.
+    Args:
+        curve: counts at each threshold.
+        false_alarms: maximum number per minute of held time of one finger, pushes included.
     """
-
-    false_alarms: float
-    counted_in: Literal["held", "quiet", "use"] = "held"
-
-
-def choose_threshold(curve: SlipCounts, choice: ThresholdChoice) -> int | None:
-    """Return the index in `SLIP_THRESHOLDS` of the choice on a curve.
-
-    It is None if no threshold fits, or nothing is held.
-    """
-    index = int(_lowest(_ratios([curve]), choice, np.ones((1, 1)))[0])
+    index = int(_lowest(_ratios([curve]), false_alarms, np.ones((1, 1)))[0])
     return index if index < len(curve) else None
 
 
@@ -154,51 +129,35 @@ def _ratios(curves: Sequence[SlipCounts]) -> Ratios:
     return ratios
 
 
-def _lowest(ratios: Ratios, choice: ThresholdChoice, draws: Array) -> Integers:
-    """Return the index of the threshold of a choice in each resample.
+def _lowest(ratios: Ratios, false_alarms: float, draws: Array) -> Integers:
+    """Return the index of the chosen threshold in each resample.
 
     Args:
         ratios: of the recordings.
-        choice: of the threshold.
+        false_alarms: maximum number per minute.
         draws: (n, n_recordings) how often each is drawn.
 
     Returns:
         (n,) indices; the number of thresholds where none fits, or nothing is held.
     """
-    names = ("raised_quiet", ""), (FALSE_ALARMS, "quiet"), (FALSE_ALARMS, "held")
+    names = ("raised_quiet", ""), (FALSE_ALARMS, "held")
     drawn = [(draws @ ratios[name][0], (draws @ ratios[name][1])[:, None]) for name in names]
-    (raised, quiet), (n_quiet, _), (n, seconds) = drawn
-    if choice.counted_in == "quiet":
-        n, seconds = n_quiet, quiet
-    elif choice.counted_in == "use":
-        share, disturbed = DISTURBED_SHARE, seconds - quiet
-        more = 60 * _poisson_limit(n / 60) - n
-        has_both = (quiet > 0) & (disturbed > 0)
-        weights = (1 - share) * n_quiet * disturbed + share * (n - n_quiet) * quiet
-        in_use = np.divide(weights * seconds, quiet * disturbed, out=np.array(n), where=has_both)
-        n = in_use + more
+    (raised, quiet), (n, seconds) = drawn
     # Without held time the rate is not known, so no threshold fits; without quiet hold nothing can
     # be raised in it.
-    few = (n <= choice.false_alarms * seconds) & (seconds > 0)
-    fits = few & (raised <= MAX_RAISED_QUIET * quiet)
+    fits = (n <= false_alarms * seconds) & (seconds > 0) & (raised <= MAX_RAISED_QUIET * quiet)
     unbroken = np.logical_and.accumulate(fits[:, ::-1], axis=1)  # from the highest on
     return np.asarray(fits.shape[1] - unbroken.sum(axis=1))
 
 
-def _poisson_limit(n: Array) -> Array:
-    """Return the upper limits of the means of Poisson numbers, within 1 %."""
-    root = np.sqrt(n + 1.0)
-    return np.asarray((n + 1.0) * (1 - 1 / (9 * root**2) + UPPER_DEVIATION / (3 * root)) ** 3)
-
-
 def held_out_indices(
-    curves: Sequence[SlipCounts], choice: ThresholdChoice, groups: Sequence[int], draws: Array
+    curves: Sequence[SlipCounts], false_alarms: float, groups: Sequence[int], draws: Array
 ) -> Integers:
     """Return the index of the threshold for each recording, chosen without its group.
 
     Args:
         curves: of each recording.
-        choice: of the threshold; if no threshold fits, the highest is taken.
+        false_alarms: maximum number per minute; if no threshold fits, the highest is taken.
         groups: of each recording.
         draws: (n, n_recordings) how often each is drawn.
 
@@ -209,7 +168,7 @@ def held_out_indices(
     indices = np.empty(draws.shape, dtype=np.int64)
     for group in np.unique(own):
         others = np.where(own == group, 0.0, draws)
-        indices[:, own == group] = _lowest(ratios, choice, others)[:, None]
+        indices[:, own == group] = _lowest(ratios, false_alarms, others)[:, None]
     return np.asarray(np.minimum(indices, len(curves[0]) - 1))
 
 
@@ -274,7 +233,7 @@ def slip_summary(
 
 def summarise_choice(
     curves: Sequence[Mapping[str, SlipCounts]],
-    choice: ThresholdChoice,
+    false_alarms: float,
     *,
     groups: Sequence[int] = (),
     training: Sequence[Mapping[str, SlipCounts]] = (),
@@ -284,8 +243,8 @@ def summarise_choice(
 
     Args:
         curves: of each finger, of each recording.
-        choice: of the threshold, made again in each resample; if no threshold fits, the highest
-            is taken.
+        false_alarms: maximum number per minute, for which the threshold is chosen again in each
+            resample; if no threshold fits, the highest is taken.
         groups: of each recording; its threshold is chosen from the other groups. By default each
             recording is one.
         training: curves of other recordings, from which it is chosen instead.
@@ -299,9 +258,9 @@ def summarise_choice(
     def chosen(draw: Callable[[int, int], Array]) -> Integers:
         if not others:
             draws = draw(len(pooled), seed)
-            return held_out_indices(pooled, choice, groups or range(len(pooled)), draws)
+            return held_out_indices(pooled, false_alarms, groups or range(len(pooled)), draws)
         # The other recordings are another sample of the world: their draws have their own seed.
-        lowest = _lowest(_ratios(others), choice, draw(len(others), seed + 1))
+        lowest = _lowest(_ratios(others), false_alarms, draw(len(others), seed + 1))
         return np.asarray(np.minimum(lowest, len(others[0]) - 1))[:, None]
 
     (indices,) = chosen(lambda n, _: np.ones((1, n)))

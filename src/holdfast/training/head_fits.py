@@ -46,7 +46,6 @@ def fit_slip(
     squares: bool = False,
     n_min: int = MIN_SLIDING_SAMPLES,
     c: float | None = None,
-    prior: Linear | None = None,
 ) -> Head | None:
     """Fit the head `slip` to the samples that are in no unit that is left out.
 
@@ -61,8 +60,6 @@ def fit_slip(
         squares: whether the head has squares of the features.
         n_min: number of sliding samples from which a head is fitted.
         c: weight of a sample against the penalty on the weights; by default that of the recipe.
-        prior: rule of other hands on the same features, whose value is one more feature; without
-            squares.
 
     Returns:
         The head, with a threshold of 0.5; None with too few samples that slide, or none that hold
@@ -85,12 +82,6 @@ def fit_slip(
         weights, n = np.array(fitted.weights[0]) / np.array(fitted.scale), len(mean)
         intercept = fitted.intercepts[0] - float(weights @ np.array(fitted.mean))
         rule = Linear.of(mean, scale, weights[:n], intercept, weights[n:], offset=fitted.offset)
-    elif prior is not None:
-        value = prior.decision(classes.features)
-        wide = np.column_stack([classes.features, value])
-        rule = _without_prior(
-            recipe.fit(classes._replace(features=wide), parameters, 0).rule, prior
-        )
     else:
         rule = recipe.fit(classes, parameters, 0).rule
     # The odds of sliding fall by the still samples that were left out.
@@ -101,22 +92,6 @@ def fit_slip(
         name="slip", link="logit", features=features, rule=rule,
         smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD_TIME,
     )  # fmt: skip
-
-
-def _without_prior(rule: Linear, prior: Linear) -> Linear:
-    """Return a rule on features alone for one whose last feature is the value of a prior.
-
-    Both are linear in the features phi, so their sum is:
-
-        w_j phi_j + w z(phi), z(phi) = v_j phi_j + z(0)
-    """
-    n = prior.n_features
-    mean, scale = (moment[:n] for moment in rule.moments)
-    raw = np.array(rule.weights[0]) / np.array(rule.scale)
-    weights = raw[:n] + raw[n] * np.array(prior.weights[0]) / np.array(prior.scale)
-    at_mean = float(prior.decision(mean[None])[0])  # the features at their mean, z beside its own
-    intercept = rule.intercepts[0] + raw[n] * (at_mean - rule.mean[n])
-    return Linear.of(mean, scale, weights * scale, intercept, slope=rule.slope, offset=rule.offset)
 
 
 def fit_speed(samples: TargetSamples, left_out: Collection[int], features: Features) -> Head | None:

@@ -18,14 +18,12 @@ import numpy as np
 from holdfast.blocks import Digests
 from holdfast.detection import ANY_FINGER, Head, Model, Training
 from holdfast.detection.features import extract
-from holdfast.detection.heads import Linear
 from holdfast.detection.plan import StreamPlan, Tare
-from holdfast.detection.specs import SLIDING_CHOICE, SLIDING_FEATURES, FeatureSpec
+from holdfast.detection.specs import SLIDING_FEATURES
 from holdfast.errors import DISTRIBUTION, TrainingError
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
     SlipSummary,
-    ThresholdChoice,
     choose_threshold,
     slip_curve,
     slip_intervals,
@@ -48,11 +46,9 @@ from holdfast.training.thresholds import N_SHOWN, CurvePoint
 
 WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
-FEW_C, TAUGHT_C = 0.01, 0.1
-"""C of the fit below `FEW_GRASPS` recordings with slips, and from there on: a tenth of that of a
-model of many recordings, since 100 to 200 weights have some tens of slips."""
-FEW_GRASPS = 4
-"""Number of recordings with slips from which they carry the weights of `TAUGHT_C`."""
+TAUGHT_C = 0.01
+"""C of the fit: a hundredth of that of a model of many recordings, since 97 weights have some tens
+of slips. A weaker penalty finds more in grasps like those of the fit, and less in others."""
 LOG_ODDS_SHIFT = -2.0
 """Shift of the log odds of what slides, as likely as what is still, that keeps the thresholds with
 few false alarms inside of `SLIP_THRESHOLDS`."""
@@ -78,30 +74,6 @@ together."""
 SHOWN_FALSE_ALARMS = (0.5, 1.0, 1.5, 3.0, 6.0)
 """Wanted false alarms per minute of a finger, beside that of the model, whose thresholds are shown:
 the user moves along them by the option `--false-alarms`."""
-
-
-class FeatureSet(NamedTuple):
-    """Features to which a head may be fitted: the more, the more slips they need.
-
-    Attributes:
-        name: for the user.
-        features: among `SLIDING_FEATURES`.
-        squares: whether their squares are features, too.
-        has_prior: whether the log odds of other hands are one more feature.
-    """
-
-    name: str
-    features: tuple[FeatureSpec, ...]
-    squares: bool = False
-    has_prior: bool = False
-
-
-FEATURE_SETS = (
-    FeatureSet("few features and the prior of other hands", SLIDING_CHOICE, has_prior=True),
-    FeatureSet("all features", SLIDING_FEATURES),
-    FeatureSet("all features with squares", SLIDING_FEATURES, squares=True),
-)
-"""Sets among which `teach` chooses, by what they find out of fold."""
 
 
 class TaughtPoint(msgspec.Struct, frozen=True):
@@ -136,7 +108,6 @@ class Taught:
         hand_alarms: false alarms of all fingers per minute in which the hand holds.
         curve: what other thresholds give.
         n_recordings: number of recordings with known slips.
-        features: name of the set of features that found most.
         warnings: for the user.
     """
 
@@ -146,7 +117,6 @@ class Taught:
     hand_alarms: float
     curve: tuple[TaughtPoint, ...]
     n_recordings: int
-    features: str
     warnings: tuple[str, ...]
 
     @property
@@ -181,7 +151,6 @@ class Taught:
             "base": None if self.base is None else self.base.pooled,
             "hand_false_alarms_per_minute": self.hand_alarms,
             "curve": self.curve,
-            "features": self.features,
             "warnings": self.warnings,
             "verdict": self.verdict,
         }
@@ -209,9 +178,9 @@ class TaughtPart(NamedTuple):
 
 Curves = Sequence[Mapping[str, SlipCounts]]
 """Counts at each threshold of the fingers of recordings."""
-FoldScores = list[tuple[Curves, Mapping[str, SlipCounts]]]
-"""Of each recording of a fold: counts at each threshold of the head of each set of features, and
-those of the base."""
+FoldScores = list[tuple[Mapping[str, SlipCounts], Mapping[str, SlipCounts]]]
+"""Of each recording of a fold: counts at each threshold of the taught head, and those of the
+base."""
 
 
 def teach(
@@ -274,21 +243,15 @@ def teach_with_report(
     base = _base_of(model, list(parts.values()))
 
     # A head that is scored on a recording was fitted without it, and without those of its fold.
-    prior, n_folds = _prior_of(model), min(len(parts), MAX_TAUGHT_FOLDS)
-    sets = [x for x in FEATURE_SETS if prior is not None or not x.has_prior]
+    n_folds = min(len(parts), MAX_TAUGHT_FOLDS)
     folds = [list(parts)[fold::n_folds] for fold in range(n_folds)]
     tasks = ((fold, [OneRecording(recordings, k) for k in fold]) for fold in folds)
-    scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples, sets, prior))
+    scored = engine.map_ordered(_score_fold, tasks, shared=(base, model, samples))
     scores = [pair for fold in progress(scored, "fitting", n_folds) for pair in fold]
-    counts_of_base = [counts for _, counts in scores]
-    by_set = [[curves[k] for curves, _ in scores] for k in range(len(sets))]
-    best = max(range(len(sets)), key=lambda k: _mean_found(by_set[k]))
-    curves, feature_set = by_set[best], sets[best]
+    curves, counts_of_base = [curve for curve, _ in scores], [counts for _, counts in scores]
     pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
     total = SlipCounts.total(pooled)
-    index = choose_threshold(total, ThresholdChoice(false_alarms, "use"))
-    if index is None:  # too little is held for the upper end of the interval
-        index = choose_threshold(total, ThresholdChoice(false_alarms))
+    index = choose_threshold(total, false_alarms)
     if index is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
@@ -299,7 +262,7 @@ def teach_with_report(
         [{name: curve[index] for name, curve in fingers.items()} for fingers in curves],
         slip_intervals([curve[index].as_curve for curve in pooled], seed=seed),
     )
-    head = _fitted(samples, (), feature_set, prior)
+    head = _fitted(samples, ())
     shown = range(max(index - N_SHOWN, 0), min(index + N_SHOWN + 1, len(total)))
     points = [CurvePoint.of_slips(float(SLIP_THRESHOLDS[k]), total[k]) for k in shown]
     chosen = points[index - shown.start]
@@ -321,7 +284,6 @@ def teach_with_report(
         _hand_alarms(curves, index),
         tuple(_curve_points(curves, total, {*SHOWN_FALSE_ALARMS, false_alarms})),
         len(parts),
-        feature_set.name,
         tuple(_warnings(len(parts), total[index], false_alarms)),
     )
 
@@ -417,43 +379,13 @@ def _base_of(model: Model, parts: Sequence[TaughtPart]) -> Model:
     )
 
 
-def _prior_of(model: Model) -> Linear | None:
-    """Return the rule of the slips of other hands; None without one on `SLIDING_CHOICE`."""
-    heads = {part.slip for part in model.fingers.values()}
-    head = heads.pop() if len(heads) == 1 else None
-    if head is None or head.features != SLIDING_CHOICE or head.rule.squares:
-        return None
-    return head.rule
-
-
-def _mean_found(curves: Curves) -> float:
-    """Return the share of slips found within 0.1 s, over the thresholds for several rates [%]."""
-    total = SlipCounts.total([curve for fingers in curves for curve in fingers.values()])
-    return math.fsum(
-        point.found or 0.0 for point in _curve_points(curves, total, SHOWN_FALSE_ALARMS)
-    )
-
-
-def _fitted(
-    samples: TargetSamples,
-    left_out: Collection[int],
-    feature_set: FeatureSet,
-    prior: Linear | None,
-) -> Head:
+def _fitted(samples: TargetSamples, left_out: Collection[int]) -> Head:
     """Fit the head to the samples of all recordings but some.
 
     Raises:
         TrainingError: nothing that slides, or nothing that holds still, is left.
     """
-    columns = [SLIDING_FEATURES.index(spec) for spec in feature_set.features]
-    # Those left out count, too: another penalty would give their head other scores.
-    n_grasps = len(np.unique(samples.recordings[np.asarray(samples.values) != 0]))
-    head = fit_slip(
-        replace(samples, features=samples.features[:, columns]), left_out, feature_set.features,
-        is_any=False, squares=feature_set.squares, n_min=1,
-        c=FEW_C if n_grasps < FEW_GRASPS else TAUGHT_C,
-        prior=prior if feature_set.has_prior else None,
-    )  # fmt: skip
+    head = fit_slip(samples, left_out, SLIDING_FEATURES, is_any=False, n_min=1, c=TAUGHT_C)
     if head is None:
         raise TrainingError(
             "without one of the recordings no slip is left; slips in at least three of them "
@@ -473,22 +405,18 @@ def _score_fold(
     base: Model,
     given: Model,
     samples: TargetSamples,
-    sets: Sequence[FeatureSet],
-    prior: Linear | None,
     fold: Collection[int],
     parts: Sequence[Sequence[Recording]],
 ) -> FoldScores:
-    """Return the counts about each recording of a fold, of heads that were fitted without them."""
-    heads = [_fitted(samples, fold, feature_set, prior) for feature_set in sets]
-    models = [_with_head(base, head) for head in heads]
+    """Return the counts about each recording of a fold, of a head that was fitted without them."""
+    model = _with_head(base, _fitted(samples, fold))
     scores: FoldScores = []
     for part in parts:
         recording = taught_recording(part[0])
-        taught = [compute_decisions(model, recording).known_slips for model in models]
-        curves = [{name: slip_curve(slips) for name, slips in known.items()} for known in taught]
+        known = compute_decisions(model, recording).known_slips
         base_slips = compute_decisions(given, recording).known_slips
         counts = {name: count_slips(slips) for name, slips in base_slips.items()}
-        scores.append((curves, counts))
+        scores.append(({name: slip_curve(slips) for name, slips in known.items()}, counts))
     return scores
 
 
@@ -505,7 +433,7 @@ def _curve_points(
 ) -> Iterator[TaughtPoint]:
     """Yield what the thresholds for the wanted rates give, where one fits."""
     for rate in sorted(wanted):
-        index = choose_threshold(total, ThresholdChoice(rate, "use"))
+        index = choose_threshold(total, rate)
         if index is not None:
             metrics = slip_metrics(total[index])
             yield TaughtPoint(

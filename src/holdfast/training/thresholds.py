@@ -38,7 +38,6 @@ from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLDS,
     THRESHOLDS,
     SlipSummary,
-    ThresholdChoice,
     choose_threshold,
     slip_curve,
     slip_summary,
@@ -508,10 +507,9 @@ def choose_slip_threshold(
         return SlipThreshold(None, None, "no decision about a slip out of fold")
     known, units = [fingers for fingers, _ in used], [unit for _, unit in used]
     pooled = SlipCounts.total([SlipCounts.total(fingers.values()) for fingers in known])
-    choice = ThresholdChoice(SLIP_FALSE_ALARMS)
-    index = choose_threshold(pooled, choice)
+    index = choose_threshold(pooled, SLIP_FALSE_ALARMS)
     if len(set(units)) > 1:
-        metrics = summarise_choice(known, choice, groups=units, seed=seed)
+        metrics = summarise_choice(known, SLIP_FALSE_ALARMS, groups=units, seed=seed)
     else:
         shown = len(SLIP_THRESHOLDS) - 1 if index is None else index
         metrics = slip_summary([{name: of[shown] for name, of in f.items()} for f in known])
@@ -764,7 +762,7 @@ def choose_handling_slips(
         if head is None or not decided:
             continue
         curve = SlipCounts.total([slip_curve(slips) for _, slips in decided])
-        index = choose_threshold(curve, ThresholdChoice(false_alarms))
+        index = choose_threshold(curve, false_alarms)
         threshold = 1.0 if index is None else float(SLIP_THRESHOLDS[index])
         found = head.share_found(threshold)
         if found is not None and found < MIN_FOUND:

@@ -42,8 +42,8 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path):
     warnings = report["warnings"]  # after the features that one taxel cannot have
     assert (code, err.splitlines()[-len(warnings) :]) == (0, warnings)
     assert set(report) == {
-        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "features",
-        "warnings", "verdict",
+        "model", "steps", "heads", "base", "hand_false_alarms_per_minute", "curve", "warnings",
+        "verdict",
     }  # fmt: skip
     slip = report["heads"]["slip"]
     assert (slip["n"], slip["grasps"], slip["out_of_fold"]["n"]) == (24, 3, 24)
