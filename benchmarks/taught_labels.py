@@ -125,6 +125,8 @@ def next_grasps(seed, folder):
     plan += [("slips", x) for x in objects[::3]] + [("coupled", x) for x in objects[1::3]]
     for profile, name in plan:
         path = folder / f"{PROFILES[profile]}_{name}.mcap"
+        if path.exists():
+            continue
         grasp = Grasp(name, 2, 1, profile, seed)
         made = simulate(grasp)
         if made.metadata["case"] == "failed":
@@ -170,7 +172,7 @@ def result(recordings, fresh):
     totals = {name: SlipCounts.total(curves) for name, curves in by_profile.items()}
     best = choose_threshold(totals["next"], WANTED)
     return {
-        "slips": pooled.n, "features": taught.features, "minutes": pooled.held_minutes,
+        "slips": pooled.n, "minutes": pooled.held_minutes,
         "printed": [pooled.incipient["0.1"], pooled.false_alarms_per_minute["held"]],
         "interval": intervals.incipient["0.1"],
         "best": None if best is None else figures(totals["next"][best]),
