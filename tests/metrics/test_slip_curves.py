@@ -52,6 +52,17 @@ class TestThresholds:
         assert rates[index - 1] > 1.0
         assert all(rate <= 1.0 for rate in rates[index:])
 
+    def test_quiet_and_disturbed_time_count_with_their_shares_of_use(self):
+        total = SlipCounts.total(self.curves)
+        quiet = total.held_seconds * 0.9
+        total = replace(total, quiet_seconds=quiet, false_quiet=total.false_held // 2)
+        disturbed = total.false_held - total.false_quiet
+        rates = 36 * total.false_quiet / quiet + 24 * disturbed / (total.held_seconds - quiet)
+        rates += 60 / total.held_seconds
+        index = choose_threshold(total, 9.0, in_use=True)
+        assert (rates[index:] <= 9.0).all()
+        assert rates[index - 1] > 9.0
+
     def test_a_summary_has_the_threshold_of_other_recordings_or_of_other_groups(self):
         tested, training = (
             [{"thumb": c} for c in part] for part in (self.curves[:4], self.curves[4:])

@@ -211,6 +211,6 @@ def test_a_rate_that_is_not_above_0_is_refused(rate, recordings):
 
 
 def test_no_threshold_is_quiet_enough(recordings, monkeypatch):
-    monkeypatch.setattr(teaching, "choose_threshold", lambda curve, choice: None)
+    monkeypatch.setattr(teaching, "choose_threshold", lambda *_, **__: None)
     with pytest.raises(TrainingError, match=r"0.01 false alarms"):
         teach(BASE, recordings, false_alarms=0.01)

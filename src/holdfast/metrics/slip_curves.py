@@ -33,6 +33,10 @@ SLIP_THRESHOLD_LOG_ODDS, SLIP_THRESHOLDS = LOG_ODDS[80:], THRESHOLDS[80:]
 MAX_RAISED_QUIET = 2.0
 """Maximum share of quiet hold in which a slip may be reported [%]."""
 
+DISTURBED_SHARE = 0.4
+"""Share of held time in which something pushes or moves the object in use: an assumption, near the
+share in the paper's experiment."""
+
 MAX_FLAGS = 1 << 22
 """Number of samples times thresholds that are counted at a time: bounds the memory."""
 FALSE_ALARMS = "false_alarms_per_minute"
@@ -88,7 +92,7 @@ def slip_curve(decisions: SlipDecisions) -> SlipCounts:
     return replace(parts[0], **joined)
 
 
-def choose_threshold(curve: SlipCounts, false_alarms: float) -> int | None:
+def choose_threshold(curve: SlipCounts, false_alarms: float, *, in_use: bool = False) -> int | None:
     """Return the index in `SLIP_THRESHOLDS` of the choice on a curve.
 
     It is the lowest threshold with few enough false alarms, and a slip reported in at most
@@ -98,8 +102,14 @@ def choose_threshold(curve: SlipCounts, false_alarms: float) -> int | None:
     Args:
         curve: counts at each threshold.
         false_alarms: maximum number per minute of held time of one finger, pushes included.
+        in_use: count the rate in use: what is surely held of guided grasps is disturbed for a
+            smaller share of its time than s = 0.4, so quiet and disturbed time are weighted:
+
+            rate = (1 - s) rate_quiet + s rate_disturbed + 1 / time
+
+            with one alarm more, which is the mean of a Poisson rate of which a number is known.
     """
-    index = int(_lowest(_ratios([curve]), false_alarms, np.ones((1, 1)))[0])
+    index = int(_lowest(_ratios([curve]), false_alarms, np.ones((1, 1)), in_use=in_use)[0])
     return index if index < len(curve) else None
 
 
@@ -129,20 +139,26 @@ def _ratios(curves: Sequence[SlipCounts]) -> Ratios:
     return ratios
 
 
-def _lowest(ratios: Ratios, false_alarms: float, draws: Array) -> Integers:
+def _lowest(ratios: Ratios, false_alarms: float, draws: Array, *, in_use: bool = False) -> Integers:
     """Return the index of the chosen threshold in each resample.
 
     Args:
         ratios: of the recordings.
         false_alarms: maximum number per minute.
         draws: (n, n_recordings) how often each is drawn.
+        in_use: as in `choose_threshold`.
 
     Returns:
         (n,) indices; the number of thresholds where none fits, or nothing is held.
     """
-    names = ("raised_quiet", ""), (FALSE_ALARMS, "held")
+    names = ("raised_quiet", ""), (FALSE_ALARMS, "quiet"), (FALSE_ALARMS, "held")
     drawn = [(draws @ ratios[name][0], (draws @ ratios[name][1])[:, None]) for name in names]
-    (raised, quiet), (n, seconds) = drawn
+    (raised, quiet), (n_quiet, _), (n, seconds) = drawn
+    disturbed = seconds - quiet
+    if in_use and quiet.all() and disturbed.all():
+        rate = (1 - DISTURBED_SHARE) * n_quiet / quiet
+        rate += DISTURBED_SHARE * (n - n_quiet) / disturbed
+        n = seconds * rate + 60  # `n` is per minute
     # Without held time the rate is not known, so no threshold fits; without quiet hold nothing can
     # be raised in it.
     fits = (n <= false_alarms * seconds) & (seconds > 0) & (raised <= MAX_RAISED_QUIET * quiet)

@@ -251,7 +251,7 @@ def teach_with_report(
     curves, counts_of_base = [curve for curve, _ in scores], [counts for _, counts in scores]
     pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
     total = SlipCounts.total(pooled)
-    index = choose_threshold(total, false_alarms)
+    index = choose_threshold(total, false_alarms, in_use=True)
     if index is None:
         raise TrainingError(
             f"no threshold gives at most {false_alarms:g} false alarms a minute in "
@@ -433,7 +433,7 @@ def _curve_points(
 ) -> Iterator[TaughtPoint]:
     """Yield what the thresholds for the wanted rates give, where one fits."""
     for rate in sorted(wanted):
-        index = choose_threshold(total, rate)
+        index = choose_threshold(total, rate, in_use=True)
         if index is not None:
             metrics = slip_metrics(total[index])
             yield TaughtPoint(
