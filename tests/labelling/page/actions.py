@@ -3,9 +3,11 @@
 from browser import DESKTOP, shows, until
 
 POSITION = """([finger, time, zone]) => {
-  const { rows, view } = holdfast, part = rows.rows.find((row) => row.finger === finger).parts[zone];
+  const { rows, view } = holdfast;
+  const part = rows.rows.find((row) => row.finger === finger).parts[zone];
   const { top, height } = part.getBoundingClientRect();
-  return [document.querySelector("#surface").getBoundingClientRect().left + view.x(time), top + height / 2];
+  const { left } = document.querySelector("#surface").getBoundingClientRect();
+  return [left + view.x(time), top + height / 2];
 }"""
 
 
