@@ -3,7 +3,8 @@
 import math
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast_grip import GripController, Limits
+from holdfast_grip import GripController, Limits, LoopState
+from holdfast_grip.laws.stability import EPISODE, START_TIME
 
 RATE = 150.0
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -36,11 +37,17 @@ def hand(time, state=ContactState.STABLE, fingers=FINGERS, **changes):
 
 
 def holding(law="holdfast", fingers=FINGERS, **limits):
-    """A controller whose grip has begun, and the time of its last update."""
+    """A controller whose grip has begun and rests, and the time of its last update."""
     controller = GripController(Limits(**limits), law, newtons_per_unit=1e-3)
     time = 0.0
     while controller.state == "IDLE":
         controller.update(hand(time, fingers=fingers), time)
+        time += 1 / RATE
+    rests_at = time + START_TIME
+    while law == "holdfast" and time < rests_at:
+        # A force that has just fallen needs more doubt to rise.
+        if controller.update(hand(time, fingers=fingers), time).state is not LoopState.HOLD:
+            rests_at = max(rests_at, time + EPISODE + 0.05)
         time += 1 / RATE
     controller.events()
     return controller, time - 1 / RATE
