@@ -40,7 +40,8 @@ Its rules have no units, so that they carry over between counts and newtons:
 8. A new grip. While a person may still hold the object, its load is not known: the hand presses
    more, and only a finger that is decided to slide starts a step.
 
-Rule 6 and the shares of rules 1 and 2 need a slip rule; without one the law reacts to instability.
+Rules 6 and 8 and the shares of rules 1 and 2 need a slip rule; without one the law reacts to
+instability.
 """
 
 import math
@@ -145,7 +146,7 @@ class Stability(Law):
         # No slip has shown it yet: the floor is `lowest` alone.
         self._friction = math.inf
         self._stepped_at = self._followed_at = self._fell_at = self._unsettled_at = NEVER
-        self._started_at, self._is_new = math.nan, True
+        self._started_at, self._is_new = math.nan, knows_slips
         self._rested_at = NEVER  # newest time without a doubt
         self._shocks, self._shock = Shocks(knows_slips=knows_slips), 0.0
         self._reason = GripReason.UNSTABLE
@@ -158,7 +159,7 @@ class Stability(Law):
         """Return the scale that doubt, load and friction need, the same for all fingers."""
         if math.isnan(self._started_at):
             self._started_at = time
-        self._is_new = time - self._started_at < START_TIME
+        self._is_new = self._knows_slips and time - self._started_at < START_TIME
         doubt = self._observe(touches, dt)
         scale = self._scale
         if doubt > CALM:

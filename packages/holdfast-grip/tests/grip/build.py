@@ -3,8 +3,7 @@
 import math
 
 from holdfast.contact import ContactEstimate, ContactState, HandEstimate, Reason
-from holdfast_grip import GripController, Limits, LoopState
-from holdfast_grip.laws.stability import EPISODE, START_TIME
+from holdfast_grip import GripController, Limits
 
 RATE = 150.0
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -26,6 +25,7 @@ def finger(name="index", time=0.0, state=ContactState.STABLE, **given):
         given.get("instability", 1.0),
         given.get("force", (normal, tangential, 0.0)),
         given.get("faults", ()),
+        slip_probability=given.get("slip_probability"),
     )
 
 
@@ -36,18 +36,12 @@ def hand(time, state=ContactState.STABLE, fingers=FINGERS, **changes):
     )
 
 
-def holding(law="holdfast", fingers=FINGERS, **limits):
-    """A controller whose grip has begun and rests, and the time of its last update."""
+def holding(law="holdfast", fingers=FINGERS, changes=None, **limits):
+    """A controller whose grip has begun, and the time of its last update."""
     controller = GripController(Limits(**limits), law, newtons_per_unit=1e-3)
     time = 0.0
     while controller.state == "IDLE":
-        controller.update(hand(time, fingers=fingers), time)
-        time += 1 / RATE
-    rests_at = time + START_TIME
-    while law == "holdfast" and time < rests_at:
-        # A force that has just fallen needs more doubt to rise.
-        if controller.update(hand(time, fingers=fingers), time).state is not LoopState.HOLD:
-            rests_at = max(rests_at, time + EPISODE + 0.05)
+        controller.update(hand(time, fingers=fingers, **(changes or {})), time)
         time += 1 / RATE
     controller.events()
     return controller, time - 1 / RATE

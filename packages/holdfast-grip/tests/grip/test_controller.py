@@ -11,9 +11,11 @@ from holdfast.contact import Cause, ContactEstimate, ContactState, HandEstimate,
 from holdfast.sensors import flat_sensor, sensor
 from holdfast_grip import LAWS, GripController, GripReason, Limits, LoopState
 from holdfast_grip.laws import Fixed
+from holdfast_grip.laws.stability import START_SCALE, START_TIME
 from holdfast_grip.span import STILL_TIME
 
 SLIPPING = {name: {"probability": 0.05, "state": ContactState.UNSTABLE} for name in FINGERS}
+NO_SLIP = {name: {"slip_probability": 0.01} for name in FINGERS}
 GONE = {name: {"state": ContactState.NO_CONTACT, "normal": 0.0} for name in FINGERS}
 RISING = {GripReason.UNSTABLE, GripReason.SLIP, GripReason.LOAD, GripReason.MARGIN}
 
@@ -67,14 +69,19 @@ class TestSteadyStart:
 
 class TestAnyInput:
     @settings(max_examples=60)
-    @given(steps, st.sampled_from(sorted(LAWS)), st.sampled_from(["hold", "open"]))
-    def test_no_command_is_beyond_the_limits(self, inputs, law, on_fault):
+    @given(
+        steps,
+        st.sampled_from(sorted(LAWS)),
+        st.sampled_from(["hold", "open"]),
+        st.sampled_from([{}, NO_SLIP]),
+    )
+    def test_no_command_is_beyond_the_limits(self, inputs, law, on_fault, rule):
         limits = Limits(min_scale=0.8, max_scale=1.7, rise=5.0, fall=2.0, on_fault=on_fault)
-        controller, time = holding(law, **msgspec.structs.asdict(limits))
+        controller, time = holding(law, changes=rule, **msgspec.structs.asdict(limits))
         before = dict.fromkeys(FINGERS, 1.0)
         newest, saved = time, 0.0
         for dt, changes in inputs:
-            fingers = {name: finger(name, time) for name in FINGERS} | changes
+            fingers = {name: finger(name, time, **rule.get(name, {})) for name in FINGERS} | changes
             command = controller.update(HandEstimate(time, ContactState.STABLE, fingers), time + dt)
             step = min(max(dt, 0.0), limits.stale_after) if math.isfinite(dt) else 0.0
             allowed = saved + step
@@ -160,6 +167,17 @@ class TestStart:
             ring = {"state": ContactState.NO_CONTACT}
             controller.update(hand(k / RATE, ring=ring), k / RATE)
         assert controller.loaded_fingers == ("thumb", "index", "middle")
+
+    def test_a_new_grip_presses_more_within_the_limits_until_the_object_rests(self):
+        """Only with a slip rule, by which it may begin before a person lets go."""
+        controller, time = holding(changes=NO_SLIP, rise=2.0)
+        commands, time = run(controller, time, START_TIME, **NO_SLIP)
+        pressed = [scales(command)["index"] for command in commands]
+        assert max(np.diff([1.0, *pressed])) <= 2.0 / RATE + 1e-9
+        assert pressed[-1] == START_SCALE
+        assert commands[0].fingers["index"].reason is GripReason.MARGIN
+        commands, _ = run(controller, time, 3.0, **NO_SLIP)
+        assert scales(commands[-1])["index"] == pytest.approx(1.0)
 
     def test_reset_returns_to_idle(self):
         controller, time = holding()
