@@ -4,7 +4,7 @@ import math
 from collections import defaultdict, deque
 from collections.abc import Mapping
 
-from holdfast.contact import ContactState, Fault, HandEstimate, Reason
+from holdfast.contact import ContactEstimate, ContactState, Fault, HandEstimate, Reason
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast_grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
@@ -25,6 +25,7 @@ IMPLAUSIBLE = frozenset(
 )
 """Faults of readings that no skin gives: a grip does not go on with the other taxels alone."""
 KEEP = FingerCommand(1.0)
+Fingers = Mapping[str, ContactEstimate]
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
 _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
@@ -33,7 +34,7 @@ _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
 class GripController:
     """Controller of the grip force of one hand, estimate by estimate.
 
-    The grip begins when the hand has been still for 0.2 s (`GripStart`). Forces and scales refer to
+    The grip begins when the hand has been still for 0.4 s (`GripStart`). Forces and scales refer to
     this moment, and the fingers in contact are the loaded fingers. The controller reads the raw
     probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
     changes without a new sample. No input raises an exception or gives a command outside the
@@ -180,7 +181,6 @@ class GripController:
         is_new = estimate.time != self._estimated_at
         # Each finger is made when it is read, so each is read once.
         fingers = dict(estimate.fingers.items())
-        estimate = HandEstimate(estimate.time, estimate.state, fingers)
         if is_new:  # the last estimate, given again, is no repeated reading
             self._estimated_at = estimate.time
             for name, finger in fingers.items():
@@ -188,14 +188,14 @@ class GripController:
         fault, self._reported = self._reported, _NONE
         dt = time - self._time
         if self.state is LoopState.IDLE:
-            return self._idle(estimate, time)
-        problem = self._problem(estimate, time, dt)
+            return self._idle(HandEstimate(estimate.time, estimate.state, fingers), time)
+        problem = self._problem(fingers, time, dt)
         if problem is GripReason.LOST and not self._latched and self._joints.have_opened:
             events = self._events
             self.reset()
             self._events = events
             self._change(LoopState.IDLE, time, GripReason.RELEASED)
-            return self._idle(estimate, time)
+            return self._idle(HandEstimate(estimate.time, estimate.state, fingers), time)
         # After a jump of the clock no age and no duration is right, so it comes first.
         if problem is not GripReason.CLOCK:
             problem = fault or problem
@@ -233,11 +233,11 @@ class GripController:
         self.law.start(touches, names.index(str(self._thumb)) if opposed else -1)
         self._change(LoopState.HOLD, time)
 
-    def _problem(self, estimate: HandEstimate, time: float, dt: float) -> GripReason:
+    def _problem(self, fingers: Fingers, time: float, dt: float) -> GripReason:
         """Read the loaded fingers; return why this update is a fault, NONE if it is not."""
         if not 0.0 <= dt < math.inf:
             return GripReason.CLOCK
-        fingers, due = estimate.fingers, time - self._max_age
+        due = time - self._max_age
         touching, known, problem = False, True, _NONE
         for k, touch in enumerate(self._touches):
             finger = fingers.get(touch.finger)

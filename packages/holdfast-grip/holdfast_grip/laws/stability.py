@@ -81,7 +81,7 @@ SMOOTHING = 0.02
 """Time constant of the tangential and normal forces [s]."""
 FOLLOW_TIME, START_FOLLOW_TIME = 1.0, 0.1
 """Time constant with which the forces of the calm grip are followed [s], and in a new grip."""
-START_TIME, START_SCALE = 1.0, 1.4
+START_TIME, START_SCALE = 0.7, 1.2
 """Time for which a grip is new [s], longer than a person takes to let go of the object, and the
 least scale in it: people, too, press more when they take an object, until it rests."""
 LEAST_FRICTION = 0.25
@@ -101,8 +101,8 @@ STILL_UNSTABLE = 0.5
 UNSTABLE_SHARE = 0.7
 """Weight of an instability without a finger that is decided to slide. With 0.4 the hand answered
 too few slides of the hard plant (12 % dropped in place of 6)."""
-KICK_STEP, KICK_MARGIN = 0.2, 0.1
-"""What step and margin are larger by with a slip rule, which starts fewer of them."""
+KICK_STEP = 0.2
+"""What a step is larger by with a slip rule, which starts fewer of them."""
 RESPONSE_MARGIN = 0.04
 """Time after the response of the hand from which a slide that goes on starts another step [s]."""
 RESERVE = 3.0
@@ -119,7 +119,7 @@ class Stability(Law):
     """Law that reacts to the doubt in the hand, and follows the load.
 
     Args:
-        kick: whether step and margin are larger with a slip rule.
+        kick: whether a step is larger with a slip rule.
         advance: whether the force follows a load that grows.
     """
 
@@ -129,9 +129,7 @@ class Stability(Law):
     def start(self, touches: Sequence[Touch], thumb: int) -> None:
         """Take the present grip as the calm one."""
         self._knows_slips = knows_slips = any(touch.knows_slips for touch in touches)
-        has_kick = knows_slips and self._kick
-        self._least_step = STEP + (KICK_STEP if has_kick else 0.0)
-        self._margin = MARGIN + (KICK_MARGIN if has_kick else 0.0)
+        self._least_step = STEP + (KICK_STEP if knows_slips and self._kick else 0.0)
         self._advance_level = ADVANCE_LEVEL if knows_slips else HOLD_LEVEL
         self._advance_pause = ADVANCE_PAUSE if knows_slips else PRESS_TIME
         self._fingers = [LoadedFinger(touch) for touch in touches]
@@ -336,7 +334,7 @@ class Stability(Law):
         """Return a scale that falls to what the load needs, the lowest at least."""
         # What the load needs at the friction that slips have shown.
         force = self._friction * self._start_force
-        needed = self._margin * self._load / force if force > 0 else 0.0
+        needed = MARGIN * self._load / force if force > 0 else 0.0
         relaxed = min(scale, max(scale * (1.0 - FALL * dt), self._lowest(), needed))
         if relaxed < scale:
             self._fell_at = time

@@ -128,9 +128,9 @@ class TestAnyInput:
 class TestStart:
     def test_the_grip_begins_when_the_hand_has_been_stable_for_a_while(self):
         controller = GripController(Limits())
-        times = [k / RATE for k in range(60)]
+        times = [k / RATE for k in range(90)]
         states = [controller.update(hand(time), time).state for time in times]
-        assert times[states.index(LoopState.HOLD)] == pytest.approx(0.2, abs=1.5 / RATE)
+        assert times[states.index(LoopState.HOLD)] == pytest.approx(STILL_TIME, abs=1.5 / RATE)
         assert controller.loaded_fingers == FINGERS
 
     @pytest.mark.parametrize("state", [s for s in ContactState if s != "STABLE"])
@@ -163,7 +163,7 @@ class TestStart:
 
     def test_fingers_without_contact_are_not_loaded(self):
         controller = GripController(Limits())
-        for k in range(60):
+        for k in range(90):
             ring = {"state": ContactState.NO_CONTACT}
             controller.update(hand(k / RATE, ring=ring), k / RATE)
         assert controller.loaded_fingers == ("thumb", "index", "middle")

@@ -14,10 +14,10 @@ from holdfast_grip.laws.wong_zhu import WongZhu
 DT = 1 / 150
 
 
-def touch(normal=2.0, tangential=0.6, probability=0.95, instability=0.001, name="index"):
+def touch(normal=2.0, tangential=0.6, probability=0.95, name="index"):
     made = Touch(name)
     made.known = made.touching = True
-    made.probability, made.instability = probability, instability
+    made.probability = probability
     made.force, made.normal, made.tangential = (normal, tangential, 0.0), normal, tangential
     made.start_normal = 2.0
     return made
