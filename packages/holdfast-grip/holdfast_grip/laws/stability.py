@@ -278,20 +278,22 @@ class Stability(Law):
         ):
             self._sum = 0.0
             return
-        is_falling = time - self._fell_at < EPISODE
         missing, load = 0.0, self._calm_load
         if not self._is_new and (self._unstable > HOLD_LEVEL or is_blind):
             # Load that a falling force takes along is not missing: 50 false rises in 34 long holds
-            # became 14 (docs/decisions/0025).
-            if is_falling and self._calm_press > 0:
+            # became 14 (docs/decisions/0025). The calm grip follows later than the force falls.
+            if self._calm_press > 0:
                 load *= min(self._press / self._calm_press, 1.0)
             missing = max(1.0 - self._load / load, 0.0) if load > 0 else 0.0
         evidence = doubt + MISSING_GAIN * missing
-        # A step counts until the doubt has come below its level once, a fall for an episode.
+        # A step and a fall count until the doubt has come below its level once, a fall for an
+        # episode at least.
         level = HOLD_LEVEL
         if since < EPISODE and not slides_on:
             level = AGAIN_LEVEL
-        elif self._rested_at < self._stepped_at or is_falling:
+        elif (
+            self._rested_at < max(self._stepped_at, self._fell_at) or time - self._fell_at < EPISODE
+        ):
             level = FALL_LEVEL
         self._sum = max(0.0, self._sum + (evidence - level) * dt)
         is_sure = self._slides or not self._knows_slips

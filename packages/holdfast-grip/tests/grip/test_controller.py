@@ -468,8 +468,10 @@ class TestUnits:
     def test_the_law_of_holdfast_needs_no_unit(self):
         """Forces a thousand times as large give the same scales."""
         (one, time), large = holding(), GripController(Limits(), newtons_per_unit=1.0)
-        for k in range(round(time * RATE) + 1):
-            large.update(hand(k / RATE), k / RATE)
+        start = 0.0
+        while large.state is LoopState.IDLE:
+            large.update(hand(start), start)
+            start += 1 / RATE
         for k in range(1, 60):
             estimate = hand(time + k / RATE, index={"probability": 0.2, "instability": 0.0})
             first, second = (c.update(estimate, time + k / RATE) for c in (one, large))
