@@ -26,7 +26,7 @@ def test_the_readme_quotes_the_published_run():
     twice = laws["fixed-2"]
     # The law itself ran on more trials than its rivals.
     sets = json.loads((PUBLISHED / "sets.json").read_text("utf-8"))
-    ours = sets["before"][0]["now"]
+    ours = sets["mild"]["laws"]["holdfast"]
     readme = (ROOT / "README.md").read_text("utf-8").splitlines()
     row = next(line for line in readme if line.startswith("| Is less dropped?"))
     dropped, force = (
@@ -66,7 +66,7 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     with pytest.raises(FileNotFoundError):
         script.publish(runs / "none", docs, hard)
     assert (docs / "grip/old.csv").exists()
-    script.publish(mild, docs, hard, [(mild, mild)], {"impacts": hard})
+    script.publish(mild, docs, hard, {"impacts": hard})
     assert {path.name for path in (docs / "grip").iterdir()} == {
         "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "course.png",
         f"{script.PAGE}.j2",
