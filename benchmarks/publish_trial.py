@@ -1,14 +1,15 @@
 """Publish a comparison of grip laws in docs/study/, and write the page that quotes it.
 
-    python benchmarks/publish_trial.py publish MILD HARD [--set NAME FOLDER]
+    python benchmarks/publish_trial.py publish MILD HARD
+    python benchmarks/publish_trial.py sets NAME FOLDER [NAME FOLDER ...]
     python benchmarks/publish_trial.py render
 
-`publish` copies trial.json, the tables and trials as CSV, and some figures from the
-folders of finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
-page. MILD and HARD are runs of the two plants. Each --set is a run with more trials, another model
-or impacts; those called `mild` and `hard` are the figures of the law. `render` writes the page
-again. docs/study/grip-trials.md is written from grip-trials.md.j2 in that folder. Change the
-template, not the page: every figure in it is taken from the published files, and
+`publish` copies trial.json, the tables and trials as CSV, and some figures from the folders of
+finished `holdfast trial` to docs/study/grip/, in place of the old ones. MILD and HARD are runs of
+all laws on the two plants. `sets` does so for the laws of other runs: of today's law, other models
+or impacts; those called `mild` and `hard` are the figures of the law. Both write the page; `render`
+writes it again. docs/study/grip-trials.md is written from grip-trials.md.j2 in that folder. Change
+the template, not the page: every figure in it is taken from the published files, and
 lab/tests/test_docs_trial.py renders it again.
 """
 
@@ -35,30 +36,22 @@ DIGITS = 6
 """Significant digits of published numbers."""
 
 
-def publish(
-    run: Path,
-    docs: Path,
-    hard: Path,
-    others: Mapping[str, Path] | None = None,
-) -> None:
+def publish(run: Path, docs: Path, hard: Path) -> None:
     """Copy the results of two runs to docs/study/grip/, in place of the old ones.
 
     Args:
         run: folder of a finished comparison, with the mild plant.
         docs: folder of the pages of the study.
         hard: folder of one with the hard plant, published as hard.json.
-        others: folders of other runs by name, of which the laws are published.
 
     Raises:
         FileNotFoundError: a folder has no finished comparison.
     """
     documents = {"trial.json": run, "hard.json": hard}
     texts = {name: _published(folder / "trial.json") for name, folder in documents.items()}
-    sets = {name: _laws_of(folder) for name, folder in (others or {}).items()}
-    texts[SETS] = json.dumps(_rounded(sets), indent=1, ensure_ascii=False) + "\n"
     target = docs / "grip"
     for old in target.iterdir():
-        if old.suffix != ".j2":
+        if old.suffix != ".j2" and old.name != SETS:
             old.unlink()
     copied = [run / "trials.csv", *(run / "tables").glob("*.csv")]
     copied += [path for name in FIGURES if (path := run / "figures" / name).exists()]
@@ -66,6 +59,13 @@ def publish(
         shutil.copyfile(path, target / path.name)
     for name, text in texts.items():
         (target / name).write_text(text, encoding="utf-8")
+
+
+def publish_sets(docs: Path, runs: Mapping[str, Path]) -> None:
+    """Write the laws of other runs, by the name of the run, to docs/study/grip/."""
+    sets = {name: _laws_of(folder) for name, folder in runs.items()}
+    text = json.dumps(_rounded(sets), indent=1, ensure_ascii=False) + "\n"
+    (docs / "grip" / SETS).write_text(text, encoding="utf-8")
 
 
 def _laws_of(folder: Path) -> dict[str, Any]:
@@ -150,12 +150,13 @@ def main() -> None:
     verb = commands.add_parser("publish")
     verb.add_argument("run", type=Path)
     verb.add_argument("hard", type=Path)
-    verb.add_argument("--set", nargs=2, action="append", default=[], metavar=("NAME", "FOLDER"))
+    commands.add_parser("sets").add_argument("runs", nargs="+", metavar="NAME FOLDER")
     commands.add_parser("render")
     given = parser.parse_args()
     if given.command == "publish":
-        others = {name: Path(folder) for name, folder in given.set}
-        publish(given.run, DOCS, given.hard, others)
+        publish(given.run, DOCS, given.hard)
+    elif given.command == "sets":
+        publish_sets(DOCS, dict(zip(given.runs[::2], map(Path, given.runs[1::2]), strict=True)))
     write_page(DOCS)
 
 
