@@ -1,31 +1,28 @@
 """Publish a comparison of grip laws in docs/study/, and write the page that quotes it.
 
-    python benchmarks/publish_trial.py publish MILD HARD [--before NOW BEFORE] [--set NAME FOLDER]
+    python benchmarks/publish_trial.py publish MILD HARD
+    python benchmarks/publish_trial.py sets NAME FOLDER [NAME FOLDER ...]
     python benchmarks/publish_trial.py render
 
-`publish` copies trial.json, the tables and trials as CSV, and some figures from the
-folders of finished `holdfast trial` to docs/study/grip/, in place of the old ones, and writes the
-page. MILD and HARD are runs of the two plants. Each --before gives a run of today and one of an
-earlier law on the same trials, in which `holdfast` is compared in pairs, and each --set a run with
-another model or with impacts. `render` writes the page again. docs/study/grip-trials.md is written
-from grip-trials.md.j2 in that folder. Change the template, not the page: every figure in it is
-taken from the published files, and lab/tests/test_docs_trial.py renders it again.
+`publish` copies trial.json, the tables and trials as CSV, and some figures from the folders of
+finished `holdfast trial` to docs/study/grip/, in place of the old ones. MILD and HARD are runs of
+all laws on the two plants. `sets` does so for the laws of other runs: of today's law, other models
+or impacts; those called `mild` and `hard` are the figures of the law. Both write the page; `render`
+writes it again. docs/study/grip-trials.md is written from grip-trials.md.j2 in that folder. Change
+the template, not the page: every figure in it is taken from the published files, and
+lab/tests/test_docs_trial.py renders it again.
 """
 
 import argparse
 import json
-import math
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import msgspec
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from holdfast_lab.trial.document import OWN_LAW
-from holdfast_lab.trial.run import TrialResult
-from holdfast_lab.trial.summary import Summary, compare, summarize
+from holdfast_lab.trial.summary import Summary
 
 DOCS = Path(__file__).parents[1] / "docs" / "study"
 PAGE = "grip-trials.md"
@@ -34,40 +31,27 @@ FIGURES = ("force.png", "distributions.png", "course.png")
 NOT_PUBLISHED = ("trials",)
 """Parts of trial.json that are published as CSV only."""
 SETS = "sets.json"
-"""File of the other runs: each with its laws, and the pairs with an earlier law."""
+"""File of the other runs: each with its laws."""
 DIGITS = 6
 """Significant digits of published numbers."""
 
 
-def publish(
-    run: Path,
-    docs: Path,
-    hard: Path,
-    before: Sequence[tuple[Path, Path]] = (),
-    others: Mapping[str, Path] | None = None,
-) -> None:
+def publish(run: Path, docs: Path, hard: Path) -> None:
     """Copy the results of two runs to docs/study/grip/, in place of the old ones.
 
     Args:
         run: folder of a finished comparison, with the mild plant.
         docs: folder of the pages of the study.
         hard: folder of one with the hard plant, published as hard.json.
-        before: pairs of folders with `holdfast` on the same trials: today's, an earlier law's.
-        others: folders of other runs by name, of which the laws are published.
 
     Raises:
         FileNotFoundError: a folder has no finished comparison.
     """
     documents = {"trial.json": run, "hard.json": hard}
     texts = {name: _published(folder / "trial.json") for name, folder in documents.items()}
-    sets = {
-        "before": [_paired(now, earlier) for now, earlier in before],
-        "others": {name: _laws_of(folder) for name, folder in (others or {}).items()},
-    }
-    texts[SETS] = json.dumps(_rounded(sets), indent=1, ensure_ascii=False) + "\n"
     target = docs / "grip"
     for old in target.iterdir():
-        if old.suffix != ".j2":
+        if old.suffix != ".j2" and old.name != SETS:
             old.unlink()
     copied = [run / "trials.csv", *(run / "tables").glob("*.csv")]
     copied += [path for name in FIGURES if (path := run / "figures" / name).exists()]
@@ -77,38 +61,19 @@ def publish(
         (target / name).write_text(text, encoding="utf-8")
 
 
+def publish_sets(docs: Path, runs: Mapping[str, Path]) -> None:
+    """Write the laws of other runs, by the name of the run, to docs/study/grip/."""
+    sets = {name: _laws_of(folder) for name, folder in runs.items()}
+    text = json.dumps(_rounded(sets), indent=1, ensure_ascii=False) + "\n"
+    (docs / "grip" / SETS).write_text(text, encoding="utf-8")
+
+
 def _laws_of(folder: Path) -> dict[str, Any]:
     """Return the laws of a run, and what it was made with."""
     document = json.loads((folder / "trial.json").read_text("utf-8"))
     return {name: document[name] for name in ("n_trials", "seed", "model", "laws")} | {
         "plant": document["plant"]["name"],
         "impacts": document.get("impacts_per_trial", 0),
-    }
-
-
-def _paired(run: Path, before: Path) -> dict[str, Any]:
-    """Return an earlier law on the trials of a run, and the difference of today's to it."""
-    now, earlier = (
-        [
-            msgspec.convert(_without_null(one), TrialResult)
-            for one in json.loads((folder / "trial.json").read_text("utf-8"))["trials"]
-            if one["law"] == OWN_LAW
-        ]
-        for folder in (run, before)
-    )
-    numbers = {one.number for one in now}
-    earlier = [one for one in earlier if one.number in numbers]
-    document = json.loads((before / "trial.json").read_text("utf-8"))
-    names = {"model": document["model"], "plant": document["plant"]["name"]}
-    laws = {"now": summarize(now), "law": summarize(earlier)}
-    return names | laws | {"difference": compare(now, earlier)}
-
-
-def _without_null(result: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a stored result with infinite values, which JSON has as null."""
-    lacking = {"slip": math.inf} if result["dropped"] or not result["held"] else {}
-    return {name: value for name, value in result.items() if value is not None} | {
-        name: value for name, value in lacking.items() if result[name] is None
     }
 
 
@@ -150,8 +115,7 @@ def _values(folder: Path) -> dict[str, Any]:
     return {
         "trial": document,
         "hard": hard,
-        "before": sets["before"],
-        "others": sets["others"],
+        "others": sets,
         "figures": [name for name in FIGURES if (folder / name).exists()],
         "number": _number,
     }
@@ -186,14 +150,13 @@ def main() -> None:
     verb = commands.add_parser("publish")
     verb.add_argument("run", type=Path)
     verb.add_argument("hard", type=Path)
-    verb.add_argument("--before", nargs=2, action="append", default=[], metavar=("NOW", "BEFORE"))
-    verb.add_argument("--set", nargs=2, action="append", default=[], metavar=("NAME", "FOLDER"))
+    commands.add_parser("sets").add_argument("runs", nargs="+", metavar="NAME FOLDER")
     commands.add_parser("render")
     given = parser.parse_args()
     if given.command == "publish":
-        before = [(Path(now), Path(earlier)) for now, earlier in given.before]
-        others = {name: Path(folder) for name, folder in given.set}
-        publish(given.run, DOCS, given.hard, before, others)
+        publish(given.run, DOCS, given.hard)
+    elif given.command == "sets":
+        publish_sets(DOCS, dict(zip(given.runs[::2], map(Path, given.runs[1::2]), strict=True)))
     write_page(DOCS)
 
 

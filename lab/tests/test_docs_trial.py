@@ -26,7 +26,7 @@ def test_the_readme_quotes_the_published_run():
     twice = laws["fixed-2"]
     # The law itself ran on more trials than its rivals.
     sets = json.loads((PUBLISHED / "sets.json").read_text("utf-8"))
-    ours = sets["before"][0]["now"]
+    ours = sets["mild"]["laws"]["holdfast"]
     readme = (ROOT / "README.md").read_text("utf-8").splitlines()
     row = next(line for line in readme if line.startswith("| Is less dropped?"))
     dropped, force = (
@@ -66,7 +66,8 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     with pytest.raises(FileNotFoundError):
         script.publish(runs / "none", docs, hard)
     assert (docs / "grip/old.csv").exists()
-    script.publish(mild, docs, hard, [(mild, mild)], {"impacts": hard})
+    script.publish(mild, docs, hard)
+    script.publish_sets(docs, {"mild": mild, "hard": hard})
     assert {path.name for path in (docs / "grip").iterdir()} == {
         "trial.json", "hard.json", "sets.json", "trials.csv", "laws.csv", "course.png",
         f"{script.PAGE}.j2",
@@ -76,4 +77,4 @@ def test_runs_are_published_in_place_of_the_old_one(runs):
     page = (docs / script.PAGE).read_text()
     assert "(grip/course.png)" in page and "(grip/force.png)" not in page
     assert "| `fixed` | 63.6<br><sub>" in page
-    assert "| impacts | hard, 0 | `holdfast` | 11 |" in page
+    assert "| hard | hard, 0 | `holdfast` | 11 |" in page

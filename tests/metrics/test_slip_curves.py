@@ -59,7 +59,7 @@ class TestThresholds:
         disturbed = total.false_held - total.false_quiet
         rates = 36 * total.false_quiet / quiet + 24 * disturbed / (total.held_seconds - quiet)
         rates += 60 / total.held_seconds
-        index = choose_threshold(total, 9.0, in_use=True)
+        index = choose_threshold(total, 9.0, "use")
         assert (rates[index:] <= 9.0).all()
         assert rates[index - 1] > 9.0
 

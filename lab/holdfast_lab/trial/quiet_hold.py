@@ -8,8 +8,9 @@ from holdfast.twin.hand import RATE
 from holdfast.twin.impacts import Impact
 from holdfast_grip.command import GripCommand, LoopState
 
-START_TIME = 0.3
-"""Time after the loop began in which a rise of force is the law's start, and no reaction [s]."""
+START_TIME = 1.5
+"""Time after the loop began in which a rise of force is the law's start, and no reaction [s]: a
+person lets go of the object, and the law measures the response of the hand."""
 SLIP_MEMORY = 0.3
 """A reaction within this time after a fingertip slid is not false [s]: glitches of the hand's
 controller make fingertips slide before the load comes."""

@@ -1,10 +1,9 @@
 """Rows beside the laws: constant forces, and oracles that know what no sensor knows.
 
-They bound what a law can reach. `fixed-1.5` and `fixed-2` raise the first grip once. `true-slips`
-is the law of holdfast with the true slip of each finger in place of the estimates. `true-load-1.5`
-and `true-load-2` press by this multiple of the least force that holds, with the true load, friction
-and contacts. `v5-reflex` is the reflex that the driver of the Allegro Hand V5 has.
-`holdfast-widest` and `pr2-widest` are laws with `WIDEST_LIMITS` in place of the limits as shipped.
+They bound what a law can reach. `fixed-2` raises the first grip once. `true-slips` is the law of
+holdfast with the true slip of each finger in place of the estimates. `true-load-2` presses by twice
+the least force that holds, with the true load, friction and contacts. `without-kick` and
+`without-advance` are the law of holdfast without one of its rules.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,8 +24,8 @@ from holdfast.twin.simulation import Simulation
 from holdfast.twin.steps import TIP_LOAD, TIP_SLIP
 from holdfast_grip.command import GripReason
 from holdfast_grip.laws import LAWS, Law, Touch, law_named
-from holdfast_grip.laws.base import ForceTarget, stay
-from holdfast_grip.limits import Limits
+from holdfast_grip.laws.base import ForceTarget
+from holdfast_grip.laws.stability import Stability
 from holdfast_lab.trial.needed_force import needed_force
 from holdfast_lab.trial.trials import Trial
 
@@ -34,12 +33,6 @@ TRUE_SLIPS = "true-slips"
 """The row whose estimates are replaced by the truth."""
 SLIPPING_PROBABILITY, HOLDING_PROBABILITY = 0.02, 0.98
 """Probability of stability of a finger that slides, and of one that does not, in that row."""
-
-WIDEST_LIMITS = Limits(min_scale=0.5, max_scale=5.0)
-"""Limits of the rows `*-widest`. A scale of 0.5 is the least force that holds the unloaded object;
-5 is more than the twin's motors give in most grips."""
-V5_FORCE = 2.0
-"""Grasping force of the reflex of the V5, over that before."""
 
 
 class ConstantForce(Law):
@@ -99,53 +92,14 @@ class KnownLoad(Law):
         ]
 
 
-class V5Reflex(Law):
-    """Reflex of the driver of the Allegro Hand V5: from force 1 to force 2, once.
-
-    As in the driver: when the sum of the fingertip readings exceeds a level, the grasping force of
-    all fingers rises from 1 to 2. The level there is 200, in the unit of the hand's own fingertip
-    sensors, for which no calibration is known. Here the sum is that of the normal forces, and the
-    level is a multiple of the sum with which the grip began, so it is the same for light and
-    heavy objects; with a level below 1 the force doubles as soon as the grip begins. The force
-    does not return to 1: the doubled force itself keeps the sum above the level.
-
-    Args:
-        level: sum of the normal forces that starts the reflex, over that of the first grip.
-    """
-
-    def __init__(self, level: float = 0.0) -> None:
-        self.level = level
-
-    def start(self, touches: Sequence[Touch], thumb: int) -> None:
-        """Begin a grip."""
-        self._raised = False
-
-    def targets(self, touches: Sequence[Touch], time: float, dt: float) -> list[ForceTarget]:
-        """Return a scale of 2 from when the sum has exceeded the level."""
-        first = sum(touch.start_normal for touch in touches)
-        total = sum(touch.normal for touch in touches if touch.known)
-        self._raised = self._raised or total > self.level * first
-        if not self._raised:
-            return stay(touches)
-        return [(V5_FORCE, GripReason.MARGIN)] * len(touches)
-
-
 REFERENCE_ROWS: dict[str, Callable[[], Law]] = {
-    "fixed-1.5": lambda: ConstantForce(1.5),
+    "without-kick": lambda: Stability(kick=False),
+    "without-advance": lambda: Stability(advance=False),
     "fixed-2": lambda: ConstantForce(2.0),
     TRUE_SLIPS: LAWS["holdfast"],
-    "true-load-1.5": lambda: KnownLoad(1.5),
     "true-load-2": lambda: KnownLoad(2.0),
-    "v5-reflex": V5Reflex,
-    "holdfast-widest": LAWS["holdfast"],
-    "pr2-widest": LAWS["pr2"],
 }
 """Rows that are no laws for a hand, by name."""
-
-
-def limits_of(row: str) -> Limits:
-    """Return the limits of a law or reference row."""
-    return WIDEST_LIMITS if row.endswith("-widest") else Limits()
 
 
 def row_named(name: str) -> Law:

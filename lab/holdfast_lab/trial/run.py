@@ -27,15 +27,14 @@ from holdfast_lab.trial.quiet_hold import QuietHold
 from holdfast_lab.trial.reference_rows import (
     TRUE_SLIPS,
     KnownLoad,
-    limits_of,
     row_named,
     true_estimate,
 )
 from holdfast_lab.trial.trials import Trial
 
 LIMITS = Limits()
-"""Limits of all rows but `*-widest`: those that `holdfast hold` has by default. The lowest scale is
-1.6 times the least force of an unloaded object."""
+"""Limits of all rows: those that `holdfast hold` has by default. The lowest scale is 1.6 times the
+least force of an unloaded object."""
 NEWTONS_PER_FINGERTIP_COUNT = (
     NEWTONS_PER_NORMAL_COUNT,
     NEWTONS_PER_SHEAR_COUNT,
@@ -124,7 +123,7 @@ def run_trial(trial: Trial, law: str, model: str = "builtin:twin") -> TrialResul
             and `builtin:any` on others.
     """
     running = RunningTrial(trial, law, model)
-    log = _TrialLog(trial, limits_of(law))
+    log = _TrialLog(trial)
     while not (running.is_over or running.is_lost):
         command = running.step()
         log.add(running.simulation, command, running.scales)
@@ -156,7 +155,7 @@ class RunningTrial:
         self._detector = Detector(detecting, sensors)
         self._law, self._sees_truth = row_named(law), law == TRUE_SLIPS
         self._controller = GripController(
-            limits_of(law), self._law, sensors=sensors,
+            LIMITS, self._law, sensors=sensors,
             newtons_per_unit=NEWTONS_PER_FINGERTIP_COUNT,
             reports_slips=detecting.reports_slips or self._sees_truth,
         )  # fmt: skip
@@ -237,9 +236,8 @@ class _Sample(NamedTuple):
 class _TrialLog:
     """Numbers of a trial, sample by sample."""
 
-    def __init__(self, trial: Trial, limits: Limits) -> None:
+    def __init__(self, trial: Trial) -> None:
         self._trial = trial
-        self._highest_scale = limits.max_scale
         self._needed = needed_force(trial)
         self._samples: list[_Sample] = []
         self._scales: list[Array] = []
@@ -263,7 +261,7 @@ class _TrialLog:
             self._slid += np.where(speeds > SLIP_SPEED, speeds, 0.0) / RATE
         if began and not is_loaded:
             self._quiet.add(held_for, float(speeds.max()), command)
-        self._at_limit = bool((scales >= LIMIT_SHARE * self._highest_scale).any())
+        self._at_limit = bool((scales >= LIMIT_SHARE * LIMITS.max_scale).any())
         least = (*self._needed.at(held_for), least_force_at(self._trial, held_for))
         force = float(tips[:, TIP_LOAD].sum())
         self._samples.append(_Sample(held_for, force, *least, float(speeds.max())))

@@ -4,7 +4,7 @@ import math
 from collections import defaultdict, deque
 from collections.abc import Mapping
 
-from holdfast.contact import ContactState, Fault, HandEstimate, Reason
+from holdfast.contact import ContactEstimate, ContactState, Fault, HandEstimate, Reason
 from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array
 from holdfast_grip.command import FingerCommand, GripCommand, GripEvent, GripReason, LoopState
@@ -12,34 +12,20 @@ from holdfast_grip.laws import Law, Touch, law_named
 from holdfast_grip.laws.base import Three
 from holdfast_grip.limits import Limits
 from holdfast_grip.repeats import RepeatMonitor
+from holdfast_grip.span import GripStart, JointWay
 
 MAX_EVENTS = 1000
 """Number of events that a controller keeps until `events` is called; the oldest are dropped."""
 OVERLOAD = 1.5
 """Multiple of `Limits.max_force` at which a measured force is a fault."""
-STABLE_TIME_BEFORE_GRIP = 0.2
-"""Time for which the hand has been STABLE when the grip begins [s]."""
-CALM_TIME_BEFORE_GRIP = 1.0
-"""The same, for which fingers with `CALM_SHARE` of the force have been STABLE: longer than a person
-takes to let go of the object [s]."""
-STEADY_BAND = 0.15
-"""Share by which the sums of the normal and the tangential forces may change in a steady grip."""
-CALM_SHARE = 0.7
-"""Share of the normal force on STABLE fingers from which a grip may begin."""
 DETECTOR_RATE = 150.0
 """Rate of the samples, if no sensor is given [Hz]."""
-MIN_FINGERS = 2
-"""Number of fingers in contact from which there is a grip; one, for a hand of one finger."""
-MIN_OPENING = 0.1
-"""Share of the way that the joints closed, by which they went back when the object is let go."""
-MIN_CLOSING = 0.05
-"""Length of that way from which its direction is known [rad]."""
 IMPLAUSIBLE = frozenset(
     {Fault.INVALID, Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.COPIED, Fault.REZEROED}
 )
-"""Faults of readings that no skin gives. A grip does not go on with them, though the state of the
-finger may be that of its other taxels."""
+"""Faults of readings that no skin gives: a grip does not go on with the other taxels alone."""
 KEEP = FingerCommand(1.0)
+Fingers = Mapping[str, ContactEstimate]
 
 _NONE, _UNKNOWN = GripReason.NONE, ContactState.UNKNOWN
 _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
@@ -48,11 +34,8 @@ _HOLD, _REACT, _RELAX = LoopState.HOLD, LoopState.REACT, LoopState.RELAX
 class GripController:
     """Controller of the grip force of one hand, estimate by estimate.
 
-    The grip begins when the hand has been STABLE for 0.2 s, or when for 1 s the fingers that are
-    STABLE, two at least, carried 70 % of the normal force and no finger was UNKNOWN. Where the
-    model has a slip rule, 1 s without a slip in which the forces stay the same also begins it: so
-    a grip that is lighter than those the model was trained on is held too. Forces and scales refer
-    to this moment, and the fingers in contact are the loaded fingers. The controller reads the raw
+    The grip begins when the hand has been still for 0.4 s (`GripStart`). Forces and scales refer to
+    this moment, and the fingers in contact are the loaded fingers. The controller reads the raw
     probability of every sample, not the debounced state. UNKNOWN never lowers a force, and no force
     changes without a new sample. No input raises an exception or gives a command outside the
     limits.
@@ -124,6 +107,7 @@ class GripController:
         self._thumb = thumb
         ceiling = math.inf if limits.max_force is None else limits.max_force
         self._ceiling = OVERLOAD * ceiling
+        self._start = GripStart(self._new_touch)
         self._monitors: defaultdict[str, RepeatMonitor] = defaultdict(RepeatMonitor)
         self.reset()
 
@@ -132,10 +116,7 @@ class GripController:
         self.state = LoopState.IDLE
         # Fingers of the grip, set by `_begin`; empty without a grip.
         self._touches: list[Touch] = []
-        # Joint angles: the first ones, those when the grip began, and the newest; None without.
-        self._open_angles: Array | None = None
-        self._grip_angles: Array | None = None
-        self._angles: Array | None = None
+        self._joints = JointWay()
         # When each finger, and last the whole grip, became bad; infinite while good.
         self._bad_since: list[float] = []
         # Highest scale of each finger, from its force when the grip began.
@@ -149,10 +130,7 @@ class GripController:
         self._repeats: list[RepeatMonitor] = []
         # Times of the last update that counted and of its estimate; NaN before the first.
         self._time = self._estimated_at = math.nan
-        # NaN is in no order with a time, so what has not begun never lasts long enough.
-        self._stable_since = self._calm_since = self._steady_since = math.nan
-        # Sums of normal and tangential forces at the begin of a steady grip.
-        self._steady_forces = math.nan, math.nan
+        self._start.reset()
         self._valid_since = math.nan
         self._raised_at = -math.inf
         # The present fault, and that of `report`, which the next update takes.
@@ -183,9 +161,7 @@ class GripController:
         Args:
             angles: (n_joints,) measured angle of each joint, in any order that stays [rad].
         """
-        self._angles = angles
-        if self._open_angles is None:
-            self._open_angles = angles
+        self._joints.add(angles)
 
     def update(self, estimate: HandEstimate, time: float) -> GripCommand:
         """Process an estimate, or the passing of time if the estimate is the last one again.
@@ -205,7 +181,6 @@ class GripController:
         is_new = estimate.time != self._estimated_at
         # Each finger is made when it is read, so each is read once.
         fingers = dict(estimate.fingers.items())
-        estimate = HandEstimate(estimate.time, estimate.state, fingers)
         if is_new:  # the last estimate, given again, is no repeated reading
             self._estimated_at = estimate.time
             for name, finger in fingers.items():
@@ -213,14 +188,14 @@ class GripController:
         fault, self._reported = self._reported, _NONE
         dt = time - self._time
         if self.state is LoopState.IDLE:
-            return self._idle(estimate, time)
-        problem = self._problem(estimate, time, dt)
-        if problem is GripReason.LOST and not self._latched and self._has_opened():
+            return self._idle(HandEstimate(estimate.time, estimate.state, fingers), time)
+        problem = self._problem(fingers, time, dt)
+        if problem is GripReason.LOST and not self._latched and self._joints.have_opened:
             events = self._events
             self.reset()
             self._events = events
             self._change(LoopState.IDLE, time, GripReason.RELEASED)
-            return self._idle(estimate, time)
+            return self._idle(HandEstimate(estimate.time, estimate.state, fingers), time)
         # After a jump of the clock no age and no duration is right, so it comes first.
         if problem is not GripReason.CLOCK:
             problem = fault or problem
@@ -237,76 +212,17 @@ class GripController:
         """Wait for a grip; begin it when the hand has been stable for long enough."""
         commands = {name: self._commands.get(name, KEEP) for name in estimate.fingers}
         self._commands = commands
-        is_stable = estimate.state is ContactState.STABLE
-        self._stable_since = _since(self._stable_since, time, still=is_stable)
-        is_calm = is_stable or self._is_calm(estimate)
-        self._calm_since = _since(self._calm_since, time, still=is_calm)
-        is_steady = not is_stable and self._is_steady(estimate)
-        self._steady_since = _since(self._steady_since, time, still=is_steady)
-        if (
-            time - self._stable_since >= STABLE_TIME_BEFORE_GRIP
-            or time - self._calm_since >= CALM_TIME_BEFORE_GRIP
-            or time - self._steady_since >= CALM_TIME_BEFORE_GRIP
-        ):
-            self._begin(estimate, time)
+        if touches := self._start.update(estimate, time):
+            self._begin(touches, time)
         return GripCommand(time, self.state, dict(commands))
-
-    def _is_calm(self, estimate: HandEstimate) -> bool:
-        """Return whether the fingers that are STABLE carry nearly all of an UNSTABLE hand."""
-        # A hand that is UNKNOWN or without contact holds nothing.
-        if estimate.state is not ContactState.UNSTABLE:
-            return False
-        total = calm = 0.0
-        n_stable = 0
-        for name, finger in estimate.fingers.items():
-            touch = self._new_touch(name)
-            # Without the force of one finger, the share of the others is not known.
-            if finger.state is _UNKNOWN or not touch.read(finger):
-                return False
-            total += touch.normal
-            if finger.state is ContactState.STABLE:
-                calm, n_stable = calm + touch.normal, n_stable + 1
-        return n_stable >= MIN_FINGERS and calm >= CALM_SHARE * total
-
-    def _is_steady(self, estimate: HandEstimate) -> bool:
-        """Return whether nothing slides and the forces are those of the samples before.
-
-        A change by more than `STEADY_BAND` begins another grip, whose forces are compared then.
-        """
-        total = across = 0.0
-        n_touching = 0
-        for name, finger in estimate.fingers.items():
-            touch = self._new_touch(name)
-            known = finger.state is not _UNKNOWN and touch.read(finger)
-            # Without a slip rule, a steady slide would look like a steady grip.
-            if not known or not touch.knows_slips or touch.slides:
-                return False
-            total, across = total + touch.normal, across + touch.tangential
-            n_touching += touch.touching
-        before, across_before = self._steady_forces
-        band = STEADY_BAND * total
-        if abs(total - before) <= band and abs(across - across_before) <= band:
-            return n_touching >= MIN_FINGERS
-        self._steady_forces = total, across
-        return False
 
     def _new_touch(self, name: str) -> Touch:
         normal = self._normals.get(name, (1.0, 0.0, 0.0))
         return Touch(name, normal, self._factors, reports_slips=self._reports_slips)
 
-    def _begin(self, estimate: HandEstimate, time: float) -> None:
-        held = (ContactState.STABLE, ContactState.UNSTABLE)
-        touches = [
-            self._new_touch(name)
-            for name, finger in estimate.fingers.items()
-            if finger.state in held
-        ]
-        finite = all(touch.read(estimate.fingers[touch.finger]) for touch in touches)
-        # A hand with a single sensor begins with one finger.
-        if not finite or len(touches) < min(MIN_FINGERS, len(estimate.fingers)):
-            return
+    def _begin(self, touches: list[Touch], time: float) -> None:
         self._touches, self._time = touches, time
-        self._grip_angles = self._angles
+        self._joints.grip()
         for touch in touches:
             touch.start()
         self._highest = [self.limits.highest_scale(touch.start_normal) for touch in touches]
@@ -317,11 +233,11 @@ class GripController:
         self.law.start(touches, names.index(str(self._thumb)) if opposed else -1)
         self._change(LoopState.HOLD, time)
 
-    def _problem(self, estimate: HandEstimate, time: float, dt: float) -> GripReason:
+    def _problem(self, fingers: Fingers, time: float, dt: float) -> GripReason:
         """Read the loaded fingers; return why this update is a fault, NONE if it is not."""
         if not 0.0 <= dt < math.inf:
             return GripReason.CLOCK
-        fingers, due = estimate.fingers, time - self._max_age
+        due = time - self._max_age
         touching, known, problem = False, True, _NONE
         for k, touch in enumerate(self._touches):
             finger = fingers.get(touch.finger)
@@ -350,20 +266,6 @@ class GripController:
             return _NONE
         # A contact may be missed for a moment; an object that is lost stays lost.
         return GripReason.LOST if self._lasts(-1, time) else _NONE
-
-    def _has_opened(self) -> bool:
-        """Return whether the joints went back since the grip began, as a hand that lets go does.
-
-        The fingers of a hand that lost its object close further.
-        """
-        before, grip, now = self._open_angles, self._grip_angles, self._angles
-        if before is None or grip is None or now is None:
-            return False
-        if not before.shape == grip.shape == now.shape:
-            return False
-        closing, moved = grip - before, now - grip
-        way = float(closing @ closing)
-        return way >= MIN_CLOSING**2 and float(moved @ closing) <= -MIN_OPENING * way
 
     def _lasts(self, k: int, time: float) -> bool:
         """Return whether what is bad now has been bad for `fault_after`."""
@@ -438,13 +340,6 @@ class GripController:
     def _change(self, state: LoopState, time: float, reason: GripReason = GripReason.NONE) -> None:
         self.state = state
         self._events.append(GripEvent(time, state, "", math.nan, reason))
-
-
-def _since(since: float, time: float, *, still: bool) -> float:
-    """Return when stillness began, NaN if there is none. If the clock went back, start again."""
-    if not (still and math.isfinite(time)):
-        return math.nan
-    return since if since <= time else time
 
 
 def _broken_law(law: Law, n: int, given: str) -> str:

@@ -54,7 +54,7 @@ def hold(
 ) -> None:
     r"""Control the grip force of a hand by the estimates of a source.
 
-    The loop begins when the hand holds something and has been STABLE for 0.2 s. Without --armed
+    The loop begins when the hand holds something and has been STABLE for 0.4 s. Without --armed
     nothing is sent. With it, a second process watches this one, and brings the hand into its
     safe state if it dies. With SOURCE twin:... and --hand twin:, the twin is both.
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -44,6 +44,8 @@ N_RESAMPLES = 1000
 """Number of resamples of an interval."""
 
 Ratios = Mapping[tuple[str, str], tuple[Array, Array]]
+CountedIn = Literal["held", "quiet", "use"]
+"""Time in which the false alarms of a choice count, see `choose_threshold`."""
 """Metrics by name and, of those that have one, time limit: of each recording, the parts
 (n_recordings, n_thresholds) and the wholes (n_recordings,) of a ratio."""
 
@@ -92,7 +94,9 @@ def slip_curve(decisions: SlipDecisions) -> SlipCounts:
     return replace(parts[0], **joined)
 
 
-def choose_threshold(curve: SlipCounts, false_alarms: float, *, in_use: bool = False) -> int | None:
+def choose_threshold(
+    curve: SlipCounts, false_alarms: float, counted_in: CountedIn = "held"
+) -> int | None:
     """Return the index in `SLIP_THRESHOLDS` of the choice on a curve.
 
     It is the lowest threshold with few enough false alarms, and a slip reported in at most
@@ -101,15 +105,16 @@ def choose_threshold(curve: SlipCounts, false_alarms: float, *, in_use: bool = F
 
     Args:
         curve: counts at each threshold.
-        false_alarms: maximum number per minute of held time of one finger, pushes included.
-        in_use: count the rate in use: what is surely held of guided grasps is disturbed for a
-            smaller share of its time than s = 0.4, so quiet and disturbed time are weighted:
+        false_alarms: maximum number per minute of one finger.
+        counted_in: all `held` time, pushes included; `quiet` hold alone; or the rate in `use`.
+            What is surely held of guided grasps is disturbed for a smaller share of its time than
+            s = 0.4 in use, so quiet and disturbed time are weighted:
 
             rate = (1 - s) rate_quiet + s rate_disturbed + 1 / time
 
             with one alarm more, which is the mean of a Poisson rate of which a number is known.
     """
-    index = int(_lowest(_ratios([curve]), false_alarms, np.ones((1, 1)), in_use=in_use)[0])
+    index = int(_lowest(_ratios([curve]), false_alarms, counted_in, np.ones((1, 1)))[0])
     return index if index < len(curve) else None
 
 
@@ -139,14 +144,14 @@ def _ratios(curves: Sequence[SlipCounts]) -> Ratios:
     return ratios
 
 
-def _lowest(ratios: Ratios, false_alarms: float, draws: Array, *, in_use: bool = False) -> Integers:
+def _lowest(ratios: Ratios, false_alarms: float, counted_in: CountedIn, draws: Array) -> Integers:
     """Return the index of the chosen threshold in each resample.
 
     Args:
         ratios: of the recordings.
         false_alarms: maximum number per minute.
+        counted_in: as in `choose_threshold`.
         draws: (n, n_recordings) how often each is drawn.
-        in_use: as in `choose_threshold`.
 
     Returns:
         (n,) indices; the number of thresholds where none fits, or nothing is held.
@@ -155,7 +160,9 @@ def _lowest(ratios: Ratios, false_alarms: float, draws: Array, *, in_use: bool =
     drawn = [(draws @ ratios[name][0], (draws @ ratios[name][1])[:, None]) for name in names]
     (raised, quiet), (n_quiet, _), (n, seconds) = drawn
     disturbed = seconds - quiet
-    if in_use and quiet.all() and disturbed.all():
+    if counted_in == "quiet":
+        n, seconds = n_quiet, quiet
+    elif counted_in == "use" and quiet.all() and disturbed.all():
         rate = (1 - DISTURBED_SHARE) * n_quiet / quiet
         rate += DISTURBED_SHARE * (n - n_quiet) / disturbed
         n = seconds * rate + 60  # `n` is per minute
@@ -167,7 +174,11 @@ def _lowest(ratios: Ratios, false_alarms: float, draws: Array, *, in_use: bool =
 
 
 def held_out_indices(
-    curves: Sequence[SlipCounts], false_alarms: float, groups: Sequence[int], draws: Array
+    curves: Sequence[SlipCounts],
+    false_alarms: float,
+    groups: Sequence[int],
+    draws: Array,
+    counted_in: CountedIn = "held",
 ) -> Integers:
     """Return the index of the threshold for each recording, chosen without its group.
 
@@ -176,6 +187,7 @@ def held_out_indices(
         false_alarms: maximum number per minute; if no threshold fits, the highest is taken.
         groups: of each recording.
         draws: (n, n_recordings) how often each is drawn.
+        counted_in: as in `choose_threshold`.
 
     Returns:
         (n, n_recordings).
@@ -184,7 +196,7 @@ def held_out_indices(
     indices = np.empty(draws.shape, dtype=np.int64)
     for group in np.unique(own):
         others = np.where(own == group, 0.0, draws)
-        indices[:, own == group] = _lowest(ratios, false_alarms, others)[:, None]
+        indices[:, own == group] = _lowest(ratios, false_alarms, counted_in, others)[:, None]
     return np.asarray(np.minimum(indices, len(curves[0]) - 1))
 
 
@@ -250,6 +262,7 @@ def slip_summary(
 def summarise_choice(
     curves: Sequence[Mapping[str, SlipCounts]],
     false_alarms: float,
+    counted_in: CountedIn = "held",
     *,
     groups: Sequence[int] = (),
     training: Sequence[Mapping[str, SlipCounts]] = (),
@@ -261,6 +274,7 @@ def summarise_choice(
         curves: of each finger, of each recording.
         false_alarms: maximum number per minute, for which the threshold is chosen again in each
             resample; if no threshold fits, the highest is taken.
+        counted_in: as in `choose_threshold`.
         groups: of each recording; its threshold is chosen from the other groups. By default each
             recording is one.
         training: curves of other recordings, from which it is chosen instead.
@@ -274,9 +288,11 @@ def summarise_choice(
     def chosen(draw: Callable[[int, int], Array]) -> Integers:
         if not others:
             draws = draw(len(pooled), seed)
-            return held_out_indices(pooled, false_alarms, groups or range(len(pooled)), draws)
+            own = groups or range(len(pooled))
+            return held_out_indices(pooled, false_alarms, own, draws, counted_in)
         # The other recordings are another sample of the world: their draws have their own seed.
-        lowest = _lowest(_ratios(others), false_alarms, draw(len(others), seed + 1))
+        draws = draw(len(others), seed + 1)
+        lowest = _lowest(_ratios(others), false_alarms, counted_in, draws)
         return np.asarray(np.minimum(lowest, len(others[0]) - 1))[:, None]
 
     (indices,) = chosen(lambda n, _: np.ones((1, n)))

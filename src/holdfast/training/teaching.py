@@ -251,7 +251,7 @@ def teach_with_report(
     curves, counts_of_base = [curve for curve, _ in scores], [counts for _, counts in scores]
     pooled = [SlipCounts.total(fingers.values()) for fingers in curves]
     total = SlipCounts.total(pooled)
-    index = choose_threshold(total, false_alarms, in_use=True)
+    index = choose_threshold(total, false_alarms, "use")
     if index is None:  # one alarm more in so little held time is too many
         index = choose_threshold(total, false_alarms)
     if index is None:
@@ -435,7 +435,7 @@ def _curve_points(
 ) -> Iterator[TaughtPoint]:
     """Yield what the thresholds for the wanted rates give, where one fits."""
     for rate in sorted(wanted):
-        index = choose_threshold(total, rate, in_use=True)
+        index = choose_threshold(total, rate, "use")
         if index is not None:
             metrics = slip_metrics(total[index])
             yield TaughtPoint(

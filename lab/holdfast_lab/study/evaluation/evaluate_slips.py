@@ -16,8 +16,8 @@ from scipy.signal import lfilter
 from holdfast.metrics.masks import runs
 from holdfast.metrics.slip_curves import (
     SLIP_THRESHOLD_LOG_ODDS,
+    CountedIn,
     SlipSummary,
-    ThresholdChoice,
     slip_curve,
     summarise_choice,
 )
@@ -30,10 +30,8 @@ from holdfast_lab.study.evaluation.fitted_method import ScoredRecording, probabi
 
 SLIP_RATE = 1.0
 """False alarms per minute of a finger for which thresholds are chosen [1/min]."""
-CHOICE = ThresholdChoice(SLIP_RATE)
-"""Choice by the false alarms of all held time."""
-QUIET_CHOICE = ThresholdChoice(SLIP_RATE, "quiet")
-"""Choice by the false alarms of quiet hold alone: pushes and glitches may raise a slip."""
+BUDGETS: list[tuple[float, CountedIn]] = [(SLIP_RATE, "held"), (SLIP_RATE, "quiet")]
+"""Budgets of false alarms: of all held time; of quiet hold alone, as pushes may raise a slip."""
 
 Curves = Sequence[Mapping[str, SlipCounts]]
 """Counts of slips of each finger, at each threshold, of each recording."""
@@ -192,7 +190,7 @@ def summarise_slips(
     The arguments are those of `summarise_choice`.
     """
     summary, quiet_budget = (
-        summarise_choice(curves, choice, groups=groups, training=training, seed=seed)
-        for choice in (CHOICE, QUIET_CHOICE)
+        summarise_choice(curves, *budget, groups=groups, training=training, seed=seed)
+        for budget in BUDGETS
     )
     return SlipEvaluation(split, len(curves), summary, quiet_budget)

@@ -4,7 +4,7 @@ import pytest
 
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
-from holdfast.metrics.slip_curves import SLIP_THRESHOLDS, ThresholdChoice
+from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
 from holdfast.metrics.slips import SlipCounts
 from holdfast.training.head_fits import SLIP_SMOOTHING
@@ -192,9 +192,9 @@ def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, 
     seen = []
     summarise = module.summarise_choice
 
-    def noted(curves, choice, *, training, **options):
+    def noted(curves, *budget, training, **options):
         seen.append([curve for fingers in training for curve in fingers.values()])
-        return summarise(curves, choice, training=training, **options)
+        return summarise(curves, *budget, training=training, **options)
 
     monkeypatch.setattr(module, "summarise_choice", noted)
     evaluated(corpora, "holdfast")
@@ -207,10 +207,10 @@ def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, 
 
 def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):
     """Equal budgets give equal scores; one that allows nothing finds nothing."""
-    monkeypatch.setattr(module, "QUIET_CHOICE", module.CHOICE)
+    monkeypatch.setattr(module, "BUDGETS", 2 * [(module.SLIP_RATE, "held")])
     same = evaluated(corpora, "holdfast")["main"]
     assert same.quiet_budget == same.summary
-    monkeypatch.setattr(module, "QUIET_CHOICE", ThresholdChoice(-1.0, "quiet"))
+    monkeypatch.setattr(module, "BUDGETS", [(module.SLIP_RATE, "held"), (-1.0, "quiet")])
     strict = evaluated(corpora, "holdfast")["main"]
     assert strict.summary == same.summary
     assert strict.quiet_budget.pooled.incipient["0.1"] == 0.0

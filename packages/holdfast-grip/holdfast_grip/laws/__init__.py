@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from holdfast_grip.laws.base import ForceTarget, Law, Touch
-from holdfast_grip.laws.costanzo import Costanzo
 from holdfast_grip.laws.fixed import Fixed
 from holdfast_grip.laws.friction_margin import FrictionMargin
 from holdfast_grip.laws.pr2 import Pr2
@@ -15,7 +14,6 @@ LAWS: dict[str, Callable[[], Law]] = {
     "pr2": Pr2,
     "wong-zhu": WongZhu,
     "friction-margin": FrictionMargin,
-    "costanzo": Costanzo,
     "holdfast": Stability,
 }
 """Laws by name, with the best of the settings that were tried (docs/study/grip.md)."""

@@ -26,12 +26,10 @@ class Touch:
         known: whether there is an estimate; False while the state is UNKNOWN.
         touching: whether the finger is in contact.
         probability: probability that the contact is stable, of this sample, not debounced.
-        cause: cause of the instability, where the model names one.
         slides: whether the slip rule of the model decides that the finger slides; False without
             such a rule.
         knows_slips: whether the model has a slip rule, and reports slips.
         slip_probability: probability that the finger slides; 0 unless it `knows_slips`.
-        instability: sigma, in the unit of the readings times the mean factor.
         force: (F_x, F_y, F_z) in the fingertip frame [N with a calibration, else the readings'].
         normal: force along the normal of the skin, at least 0 [as `force`].
         tangential: force along the skin [as `force`].
@@ -43,10 +41,8 @@ class Touch:
         "_factors",
         "_normal",
         "_reports_slips",
-        "cause",
         "finger",
         "force",
-        "instability",
         "known",
         "knows_slips",
         "normal",
@@ -71,8 +67,7 @@ class Touch:
         self._reports_slips = reports_slips
         self.finger = finger
         self.known = self.touching = False
-        self.probability = self.instability = math.nan
-        self.cause: Cause | None = None
+        self.probability = math.nan
         self.slides = self.knows_slips = False
         self.slip_probability = 0.0
         self.force = (0.0, 0.0, 0.0)
@@ -92,13 +87,11 @@ class Touch:
         self.known = True
         self.touching = estimate.state is not _NO_CONTACT
         self.probability = probability = estimate.stable_probability
-        self.cause = estimate.cause
         # A slip rule that never decides a slip has a probability all the same, which only ranks.
         slip = estimate.slip_probability if self._reports_slips else None
         self.knows_slips = slip is not None
         self.slides = slip is not None and estimate.cause is Cause.SLIP
         self.slip_probability = 0.0 if slip is None else slip
-        self.instability = estimate.instability * (a + b + c) / 3
         self.force = (x, y, z)
         self.normal = along if along > 0.0 else 0.0
         # Rounding makes it negative where the force is along the normal.

@@ -25,6 +25,7 @@ def finger(name="index", time=0.0, state=ContactState.STABLE, **given):
         given.get("instability", 1.0),
         given.get("force", (normal, tangential, 0.0)),
         given.get("faults", ()),
+        slip_probability=given.get("slip_probability"),
     )
 
 
@@ -35,12 +36,12 @@ def hand(time, state=ContactState.STABLE, fingers=FINGERS, **changes):
     )
 
 
-def holding(law="holdfast", fingers=FINGERS, **limits):
+def holding(law="holdfast", fingers=FINGERS, changes=None, **limits):
     """A controller whose grip has begun, and the time of its last update."""
     controller = GripController(Limits(**limits), law, newtons_per_unit=1e-3)
     time = 0.0
     while controller.state == "IDLE":
-        controller.update(hand(time, fingers=fingers), time)
+        controller.update(hand(time, fingers=fingers, **(changes or {})), time)
         time += 1 / RATE
     controller.events()
     return controller, time - 1 / RATE

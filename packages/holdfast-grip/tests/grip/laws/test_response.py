@@ -4,8 +4,8 @@ import pytest
 
 from grip.laws.test_laws import DT, started, touch, update
 from holdfast_grip import GripReason
-from holdfast_grip.laws.response import ResponseTimer
-from holdfast_grip.laws.stability import PROBE_RISE, RESERVE
+from holdfast_grip.laws.response import PROBE_RISE, ResponseTimer
+from holdfast_grip.laws.stability import RESERVE
 
 
 def knowing(**fields):
@@ -48,7 +48,7 @@ class TestLaw:
     @pytest.mark.parametrize("delay", [2 * DT, 6 * DT, 10 * DT])
     def test_a_small_rise_at_the_start_measures_the_hand(self, delay):
         law, _, targets = held(delay)
-        assert law.response == pytest.approx(delay, abs=2.5 * DT)
+        assert law.response.time == pytest.approx(delay, abs=2.5 * DT)
         assert not law.notice
         assert max(target.scale for target in targets[:35]) == 1.0 + PROBE_RISE
         assert {target.reason for target in targets} <= {
@@ -57,12 +57,12 @@ class TestLaw:
 
     def test_a_slow_hand_keeps_a_reserve(self):
         law, _, targets = held(9 * DT, seconds=2.0)
-        assert targets[-1].scale == pytest.approx(1.0 + RESERVE * law.response)
+        assert targets[-1].scale == pytest.approx(1.0 + RESERVE * law.response.time)
 
     def test_a_hand_that_does_not_follow_is_told_once(self):
         law, _, targets = held(0.0, gain=0.0)
         assert "did not follow" in law.notice
-        assert law.response == 0.0
+        assert law.response.time == 0.0
         assert targets[-1].scale <= 1.0 + PROBE_RISE
 
     def test_a_slide_at_the_start_is_told(self):
@@ -75,12 +75,12 @@ class TestLaw:
     def test_a_response_that_changes_twice_is_told(self):
         law, _, _ = held(3 * DT)
         for _ in range(2):
-            law._take_response(0.11)
-        assert "to 110 ms" in law.notice
+            law.response.take(0.11)
+        assert "to 110 ms" in law.response.notice
 
     def test_a_model_without_a_slip_rule_gives_no_rise(self):
         law, _, targets = held(5 * DT, one=touch())
-        assert {target.scale for target in targets} == {1.0} and law.response == 0.0
+        assert {target.scale for target in targets} == {1.0} and law.response.time == 0.0
 
 
 class TestTwoSpeeds:

@@ -4,7 +4,8 @@ import pytest
 
 from grip.laws.test_laws import DT, started, touch, update
 from grip.laws.test_response import knowing
-from holdfast_grip.laws.stability import BLOW_TIME, LONGEST_SHOCK, SHOCK_TIME, UNCONFIRMED
+from holdfast_grip.laws.shocks import BLOW_TIME, LONGEST_SHOCK, SHOCK_TIME
+from holdfast_grip.laws.stability import UNCONFIRMED
 
 BEGIN = 1.5
 """When the doubt begins [s]: after the response of the hand was measured."""

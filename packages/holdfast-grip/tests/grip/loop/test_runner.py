@@ -114,7 +114,7 @@ class TestBehind:
     def test_a_grip_may_begin_in_them(self):
         tape = Tape()
         runner = LoopRunner(GripLoop(GripController(Limits()), tape, armed=True))
-        for k in range(60):
+        for k in range(90):
             runner.put(update(hand(k / RATE)))
         runner.run(lambda: True)
         assert [command.state for command in tape.commands] == [LoopState.HOLD]
