@@ -136,7 +136,7 @@ def test_the_demo_shows_a_real_recording_before_it_needs_extras(outcomes, monkey
     assert (out, code) == ("", 2)
     assert any("finger1, hand   UNSTABLE" in line for line in shown)
     assert "the authors of the recording label: slip at " in shown[-1]
-    expected = str(MissingExtra("mujoco", "twin,train,parquet"))
+    expected = str(MissingExtra("mujoco", "twin,train,parquet,plot"))
     assert last == f"holdfast: {expected}"
 
 

@@ -126,7 +126,6 @@ MESSAGES = [
     ("teach --from a.parquet -o new.json", "0 slips", "holdfast label"),
     ("teach --from gone -o new.json", "gone"),
     ("teach --from data -o kept.json", "kept.json exists already", "--force"),
-    ("teach twin: -o new.json --camera 0", "twin:", "--camera"),
     ("teach twin: -o new.json --to data --unattended", "data", "teach.json"),
     ("teach twin: -o new.json --resume --unattended", "new-grasps", "nothing to resume"),
     (f"teach {NO_SERVER} -o new.json --camera none.mp4", "none.mp4"),

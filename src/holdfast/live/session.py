@@ -18,8 +18,8 @@ from holdfast.errors import SourceError
 from holdfast.live.stream_detector import StreamDetector, StreamUpdate
 
 Work = Callable[[], None]
-MAX_KEPT_UPDATES = 1024
-"""Number of newest updates that are kept for readers: 6.8 s at 150 Hz."""
+MAX_KEPT_UPDATES = 4096
+"""Number of newest updates that are kept for readers: 27 s at 150 Hz."""
 MAX_LATENCIES = 8192
 """Number of newest latencies from which the percentiles are computed: 55 s at 150 Hz."""
 SWITCH_INTERVAL = 5e-4
