@@ -22,6 +22,8 @@ STILL_SECONDS = 10.0
 """Time without any change from the start on after which a finger is reported [s]."""
 MOVED_SECONDS = 2.0
 """Time of changed readings after which an axis without any change is reported [s]."""
+SHEAR_STEPS = 20
+"""Steps of the sensor that a taxel must have changed, too: the shear of less rounds to zero."""
 PULL_SECONDS = 0.25
 """Minimum time for which the normal force is below its first value [s]. This and the next two are
 those of the fault `tare_loaded` (`kernel/faults.c`) and of labels (`labelling/rules/forces.py`)."""
@@ -114,10 +116,12 @@ class _FingerReadings:
         # The normal force is one sum over readings: the normal, turned into each taxel's frame.
         self._weights = np.einsum("j,ijk->ik", sensor.normal, sensor.rotations)
         self._finds_pull = finds_pull
+        self._least_change = SHEAR_STEPS * (sensor.step or 0.0)
         self._first: npt.NDArray[Any] | None = None
         self._start = self._last = -math.inf
         # All below is relative to the first readings, and `update` alone changes it: which axes
-        # have ever changed, in how many samples, and the normal force with its noise at rest.
+        # have ever changed, how many samples have by enough, and the normal force with its noise
+        # at rest.
         self._moved = np.zeros(3, dtype=bool)
         self._n_moved = 0
         self._rest: list[float] = []
@@ -138,10 +142,10 @@ class _FingerReadings:
         change = readings - self._first
         moved = (change != 0).any(axis=0)
         self._moved |= moved
-        self._n_moved += bool(moved.any())
+        self._n_moved += bool(np.abs(change).max() > self._least_change)
         self._drift.update(np.einsum("ijk,ik->j", self._sensor.rotations, change), time)
         found = self._drifting()
-        if not self._n_moved:
+        if not self._moved.any():
             if time - self._start >= STILL_SECONDS:
                 found.append(NO_CHANGE)
         elif not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
