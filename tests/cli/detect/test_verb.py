@@ -324,13 +324,15 @@ def test_real_uskin(capsys, data_folder, tmp_path):
 @pytest.mark.parametrize("number", [None, signal.SIGINT, signal.SIGTERM])
 def test_a_live_source_ends_after_its_seconds_or_by_a_signal(capsys, monkeypatch, save, number):
     grasp = save(synthetic_recording("a", 1, ("thumb", "index")))
-    read, calls = StreamDetector.read, []
+    read, estimates = StreamDetector.read, []
 
     def read_and_signal(stream):
-        calls.append(stream)
-        if number and len(calls) == 100:
+        update = read(stream)
+        before = len(estimates)
+        estimates.extend(update.estimates)
+        if number and before < 100 <= len(estimates):  # samples of both fingers have come
             os.kill(os.getpid(), number)
-        return read(stream)
+        return update
 
     monkeypatch.setattr(StreamDetector, "read", read_and_signal)
     with (
