@@ -63,8 +63,8 @@ def demo(
     Simulate grasps of a mug and a carton with the physical twin. Evaluate the model that ships with
     holdfast on them; it has not seen these objects. Train a model with the features of the paper on
     them. Replay one recording sample by sample, as a hand would send it, on a web page or in the
-    terminal. Draw the real recording with the labels of its authors. All of it takes 29 s
-    from a fresh clone, with the packages in the cache, and 23 s once it is installed.
+    terminal. Draw the real recording with the labels of its authors. All of it takes 41 s
+    from a fresh clone, with the packages in the cache, and 29 s once it is installed.
 
     Example:
       holdfast demo
