@@ -44,10 +44,10 @@ N_RESAMPLES = 1000
 """Number of resamples of an interval."""
 
 Ratios = Mapping[tuple[str, str], tuple[Array, Array]]
-CountedIn = Literal["held", "quiet", "use"]
-"""Time in which the false alarms of a choice count, see `choose_threshold`."""
 """Metrics by name and, of those that have one, time limit: of each recording, the parts
 (n_recordings, n_thresholds) and the wholes (n_recordings,) of a ratio."""
+CountedIn = Literal["held", "quiet", "use"]
+"""Time in which the false alarms of a choice count, see `choose_threshold`."""
 
 
 class SlipIntervals(msgspec.Struct, frozen=True):
