@@ -10,6 +10,7 @@ picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
 
 import argparse
 import io
+import sys
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -215,6 +216,8 @@ def print_table(data: Path) -> None:
             print(f"| `{name}` | {n_modules} | {n:.0f} | {title} | {shares} |")
 
 
+RELEASE_TIME = 0.5
+"""After the last touch, a finger is NO_CONTACT [s]."""
 LAWS = (Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.STUCK, Fault.COPIED)
 
 
@@ -224,20 +227,43 @@ def recordings_of(folder: Path) -> Iterator[Recording]:
     yield from map(load_recording, own) if own else import_recordings(folder)
 
 
+def release(recording: Recording, finger: str) -> float:
+    """Return when a finger leaves its object for the rest of a recording [s]; else inf."""
+    if recording.truth is None or finger not in recording.truth.fingers:
+        return np.inf
+    touches = recording.truth.fingers[finger]["contact_force"].any(axis=1)
+    times = recording.truth.times
+    last = np.flatnonzero(touches)[-1] if touches.any() else len(times) - 1
+    return float(times[last]) if times[-1] - times[last] > RELEASE_TIME else np.inf
+
+
 def print_healthy(folders: Sequence[Path]) -> None:
-    """Print how often each law fires on recordings of healthy skins, by sensor."""
-    rows: dict[str, Values] = {}
+    """Print how often each law fires on recordings of healthy skins, by sensor and profile.
+
+    A release stays if a sample is not NO_CONTACT `RELEASE_TIME` after the last touch or later.
+    """
+    rows: dict[tuple[str, str], Values] = {}
+    model = Model.load("builtin:any")
     for recording in (each for folder in folders for each in recordings_of(folder)):
-        for name, trace in detect(Model.load("builtin:any"), recording).fingers.items():
+        profile = str(recording.metadata.get("profile", "real"))
+        for name, trace in detect(model, recording).fingers.items():
             bits = [trace.faults >> list(Fault).index(law) & 1 for law in LAWS]
             alarms = [(np.diff(bit, prepend=0) == 1).sum() for bit in bits]
             minutes = (trace.times[-1] - trace.times[0]) / 60
-            row = rows.setdefault(recording.modules[name].sensor.name, np.zeros(3 + len(LAWS)))
-            row += [minutes, len(trace.state), (trace.state == UNKNOWN).sum(), *alarms]
-    print(f"| sensor | minutes | {' | '.join(LAWS)} | UNKNOWN [%] |")
-    for name, (minutes, n, n_unknown, *alarms) in sorted(rows.items()):
+            released = release(recording, name)
+            stays = (trace.state[trace.times > released + RELEASE_TIME] != NO_CONTACT).any()
+            if stays:
+                print(f"stays: {recording.name} {name}", file=sys.stderr)
+            row = rows.setdefault(
+                (recording.modules[name].sensor.name, profile), np.zeros(5 + len(LAWS))
+            )
+            unknown = (trace.state == UNKNOWN).sum()
+            row += [minutes, len(trace.state), unknown, np.isfinite(released), stays, *alarms]
+    print(f"| sensor | profile | minutes | {' | '.join(LAWS)} | UNKNOWN [%] | releases | stay |")
+    for (name, profile), (minutes, n, n_unknown, releases, stays, *alarms) in sorted(rows.items()):
         counts = " | ".join(f"{x:.0f}" for x in alarms)
-        print(f"| `{name}` | {minutes:.1f} | {counts} | {100 * n_unknown / n:.2f} |")
+        ends = f"{100 * n_unknown / n:.2f} | {releases:.0f} | {stays:.0f}"
+        print(f"| `{name}` | {profile} | {minutes:.1f} | {counts} | {ends} |")
 
 
 def broken(readings: Values, start: int, digit: float) -> dict[str, tuple[Fault, Values]]:

@@ -22,6 +22,8 @@ from rosbags.typesys import Stores, get_typestore
 from holdfast.synthetic import synthetic_recording
 
 PASTE = "PASTE"
+N_SHOWN = 20
+"""Number of first and of last lines of a long output that are shown."""
 ARRAY = """
 import numpy as np
 from holdfast import Model, Recording, Tactile, detect
@@ -105,7 +107,11 @@ def main(folder: Path) -> None:
             printed, code, seconds = run(command, folder)
             proposed = code == 2 and line is not commands[-1]  # the next command is in the message
             failed += code not in (0, 130) and not proposed
-            print(f"$ {command}\n{printed.rstrip()}\n({seconds:.1f} s, exit {code})", flush=True)
+            lines = printed.rstrip().splitlines()
+            if len(lines) > 2 * N_SHOWN:
+                lines[N_SHOWN:-N_SHOWN] = ["..."]
+            text = "\n".join(lines)
+            print(f"$ {command}\n{text}\n({seconds:.1f} s, exit {code})", flush=True)
     print(f"\n{failed} commands failed; load of the machine {os.getloadavg()[0]:.1f}")
 
 

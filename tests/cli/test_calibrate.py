@@ -99,7 +99,7 @@ def test_a_live_source_is_recorded_for_a_time(capsys, folder, tmp_path, monkeypa
     code, _, err = run(capsys, "calibrate", *words)
     assert code == 0, err
     assert "pad: 11 s of holding" in err
-    assert "\nheld 9 of 30 s\n" in err
+    assert "\n10 of 12 s, held 9 s\n" in err
     handling = Model.load(tmp_path / "live.json").fingers["*"].handling["pad"]
     assert handling.seconds == pytest.approx(10.8, abs=0.5)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hand.mcap", "live.json"]

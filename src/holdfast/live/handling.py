@@ -9,12 +9,11 @@ from holdfast.live.arrival_buffer import ModuleBuffer
 from holdfast.live.recorder_setup import EXTRA_TIME
 from holdfast.live.stream_detector import TOUCHING, StreamDetector, StreamUpdate
 from holdfast.recordings import Recording, Tactile
-from holdfast.training.own_handling import ENOUGH_HANDLING
 
 LONGEST_STEP = 0.1
 """A longer step between two estimates of a finger is not held time [s]."""
-PROGRESS_STEP = 3.0
-"""Held time between two lines of progress [s]."""
+PROGRESS_STEP = 10.0
+"""Time between two lines of progress [s]."""
 
 
 class HandlingBuffer:
@@ -92,19 +91,19 @@ def record_handling(
         seconds: duration by the clock of the source [s].
         speed: of the source; 0 if it is not paced.
         is_over: returns whether the recording ends early.
-        report: called with a line after every few seconds that are held.
+        report: called with a line every `PROGRESS_STEP`.
 
     Raises:
         SourceError: no samples arrived.
     """
-    buffer, shown = HandlingBuffer(stream), 0.0
+    buffer, next_report = HandlingBuffer(stream), PROGRESS_STEP
     # A source that falls silent is not awaited for ever.
     end = time.monotonic() + (seconds / speed + EXTRA_TIME if speed else math.inf)
     while not (stream.source.ended or is_over() or time.monotonic() > end):
         buffer.put(stream.read())
-        if buffer.seconds >= shown + PROGRESS_STEP:
-            shown = buffer.seconds
-            report(f"held {shown:.0f} of {ENOUGH_HANDLING:g} s")
+        if buffer.duration >= next_report:
+            next_report += PROGRESS_STEP
+            report(f"{buffer.duration:.0f} of {seconds:g} s, held {buffer.seconds:.0f} s")
         if buffer.duration >= seconds:
             break
     if not buffer.has_samples:
