@@ -282,6 +282,7 @@ def test_what_cannot_be_read_has_the_command_that_works(tmp_path, monkeypatch, w
 
 POINTS = ({"t": t, "p": [row | {"fx": 1.0, "fy": 0.0, "fz": 2.0} for row in TAXELS]} for t in TIMES)
 WRENCH = np.concatenate([READINGS, 0.1 * NOISE], axis=-1)
+NAMED = {f"{axis}{k}": READINGS[:, k, j] for k in range(5) for j, axis in enumerate("xyz")}
 PROPOSED = {
     "without a sensor": (lambda p: npz(p, F=READINGS, t=TIMES), (), ["--sensor", "anyskin"]),
     "two that fit": (lambda p: npz(p, force=READINGS, raw=READINGS, t=TIMES), ("*",),
@@ -293,6 +294,11 @@ PROPOSED = {
                          ["--array", "F=F", "--axes=1,2,3"]),
     "displacement and force": (lambda p: npz(p, F=np.concatenate([READINGS / 10, READINGS], -1),
                                              t=TIMES), ("*",), ["--array", "F=*", "--axes=4,5,6"]),
+    "two that fit, without a sensor": (lambda p: npz(p, force=READINGS, raw=READINGS, t=TIMES), (),
+                                       ["--array", "force=anyskin"]),
+    "flat, without a sensor": (lambda p: npz(p, F=FLAT, t=TIMES, q=FLAT[:, :7]), (),
+                               ["--array", "F=anyskin"]),
+    "a wide table": (lambda p: parquet(p, {"t": TIMES} | NAMED), (), ["--sensor", "anyskin"]),
 }  # fmt: skip
 
 
@@ -301,6 +307,19 @@ def test_what_is_not_said_is_proposed(tmp_path, write, keys, options):
     with pytest.raises(ProposalError) as caught:
         imported(write(tmp_path / "a"), dict.fromkeys(keys, SKIN))
     assert caught.value.proposal.options({}) == options
+
+
+def test_a_baseline_that_was_subtracted_leaves_out_the_range(tmp_path):
+    skin, reported = sensor("uskin-4x4"), []
+    readings = np.tile(READINGS[:, :4].round(), (1, 4, 1))
+    modules = imported(
+        npz(tmp_path / "a", F=readings, t=TIMES), {"F": skin}, report=reported.append
+    )
+    assert modules["a"]["finger1"].sensor.range is None
+    assert "beyond the range 0 to 65535 of uskin-4x4" in reported[0]
+    kept = np.where(np.arange(N)[:, None, None] < 0.4 * N, -1.0, readings + 32768)
+    modules = imported(npz(tmp_path / "a", F=kept, t=TIMES), {"F": skin}, Columns(missing="none"))
+    assert modules["a"]["finger1"].sensor == skin
 
 
 def test_records_are_ordered_by_their_ids(tmp_path):

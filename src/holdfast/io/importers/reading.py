@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -46,6 +47,8 @@ __all__ = ["ANY_MODULE", "ForeignFile", "recordings_of"]
 
 DEFAULT_MODULE = "finger1"
 """Name of the module if nothing names one."""
+MAX_BEYOND_SHARE = 0.5
+"""Share of samples beyond the range of a device above which they are no faults of it."""
 
 Rows = npt.NDArray[np.intp]
 """Indices of samples of a table."""
@@ -153,10 +156,29 @@ class _Reader:
                     # A sample without a reading is none, if a number stands for it.
                     is_sample |= self._columns.missing is None
                     numbers = with_integer_type(factor * part[is_sample])
-                    tactile = Tactile(track.skin, times[rows][is_sample], numbers, kept)  # type: ignore[arg-type]
+                    skin = self._skin(track, module, numbers, kept)
+                    tactile = Tactile(skin, times[rows][is_sample], numbers, kept)  # type: ignore[arg-type]
                     labels = self._labels(track, module, rows[is_sample], tactile)
                     end = f"{track.recording}{episode and '-' + episode}"
                     yield end, module, replace(tactile, labels=labels)
+
+    def _skin(self, track: Track, module: str, readings: npt.NDArray[Any], unit: str) -> Sensor:
+        """Return the sensor, without its range if most samples cannot come from the device.
+
+        A baseline was subtracted then: what is left may lie below the least reading.
+        """
+        skin = track.skin
+        if skin.range is None or unit != skin.unit or not readings.size:
+            return skin
+        low, high = skin.range
+        beyond = (readings < low) | (readings > high)
+        if beyond.any(axis=(1, 2)).mean() <= MAX_BEYOND_SHARE:
+            return skin
+        self.notes.append(
+            f"{module}: readings from {np.nanmin(readings):g} to {np.nanmax(readings):g}, beyond "
+            f"the range {low:g} to {high:g} of {skin.name}: taken as differences from a baseline"
+        )
+        return replace(skin, range=None)
 
     def _unit(self, track: Track) -> tuple[float, str]:
         """Return the factor to the unit that is kept, and that unit."""

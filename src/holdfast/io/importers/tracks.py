@@ -155,6 +155,8 @@ def tracks_of(layout: Layout) -> list[Track]:
     if layout.source.option == "--sensor":
         return table_tracks(layout, layout.arrays, layout.arrays)
     if not layout.sensors:
+        if all(len(array.shape) == 1 for array in layout.arrays.values()):  # columns of a table
+            return table_tracks(layout, layout.arrays, layout.arrays)
         _propose_for_arrays(layout)
     names = of_names.different_parts(list(layout.sensors)) if len(layout.sensors) > 1 else [""]
     finder = _ArrayFinder(layout)
@@ -300,14 +302,22 @@ def _sensor_of(layout: Layout, module: str, n_taxels: int, unit: str | None) -> 
 
 
 def _propose_for_arrays(layout: Layout) -> None:
-    """Propose a sensor for the first array whose last axis is x, y and z, beside times."""
+    """Propose a sensor for the first array, beside times, whose last axis is x, y and z.
+
+    Or for the first with as many numbers a sample as a built-in sensor has.
+    """
     finder = _ArrayFinder(layout)
-    for name, array in layout.arrays.items():
-        shape = array.shape
-        is_taxels = len(shape) in (2, 3) and shape[-1] == len("xyz") and array.kind in "iuf"
-        if is_taxels and finder.is_reading(name) and time_names(list(finder.beside(name))):
-            layout.propose_sensor(prod(shape[1:-1]), None)
-            return
+    sizes = [len("xyz") * sensor(name).n_taxels for name in built_in_sensors()]
+    readings = [
+        array.shape
+        for name, array in layout.arrays.items()
+        if array.kind in "iuf" and finder.is_reading(name) and time_names(list(finder.beside(name)))
+    ]
+    taxels = [shape for shape in readings if len(shape) in (2, 3) and shape[-1] == len("xyz")]
+    flat = [shape for shape in readings if len(shape) == 2 and shape[1] in sizes]
+    for shape in (taxels + flat)[:1]:
+        layout.propose_sensor(prod(shape[1:]) // len("xyz"), None)
+        return
     first = max(layout.arrays, key=lambda name: prod(layout.arrays[name].shape), default="PATH")
     slash = "/" if layout.source.option == "--topic" else ""
     raise RecordingError(
@@ -406,6 +416,8 @@ class _ArrayFinder:
         """Propose arrays for the sensor of a key."""
         layout, option = self._layout, self._layout.source.option
         slash = "/" if option == "--topic" else ""
+        if key == ANY_MODULE:  # the name of a sensor that was proposed, too
+            key = next(name for _, path, name in layout.options if not path)
         options = [(option, f"{slash}{path}", key) for path in paths]
         layout.options = [*options, *(one for one in layout.options if one[2] != key)]
         if not any(choice.what == "array" for choice in layout.choices):
