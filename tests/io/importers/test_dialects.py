@@ -11,7 +11,7 @@ from holdfast.io import import_recordings
 from holdfast.io.importers import generic_csv, table
 from holdfast.io.importers.table import read_head
 from holdfast.io.proposals import ProposalError
-from holdfast.sensors import sensor
+from holdfast.sensors import flat_sensor, sensor
 
 ANYSKIN = {"*": sensor("anyskin")}
 N = 60
@@ -30,7 +30,7 @@ def rows(separator, mark=".", times=None):
 
 def imported(path, text, encoding="utf-8", **words):
     path.write_bytes(("\r\n".join(text) + "\r\n").encode(encoding))
-    return list(import_recordings(path, sensors=ANYSKIN, **words))
+    return list(import_recordings(path, **{"sensors": ANYSKIN} | words))
 
 
 def check(recordings, times=TIMES):
@@ -250,6 +250,15 @@ def test_other_columns_that_fit_are_asked(tmp_path):
     with pytest.raises(ProposalError, match=r"fx0\.\.fz4"):
         imported(tmp_path / "a.csv", text)
     check(imported(tmp_path / "a.csv", text, columns="taxels=fx0..fz4"))
+
+
+def test_of_force_and_torque_of_each_finger_the_force_is_read(tmp_path):
+    head = ["t", *(f"{name}_{q}{a}" for name in ("thumb", "index") for q in "FT" for a in "xyz")]
+    text = [",".join(head), *(line.rsplit(",", 3)[0] for line in rows(","))]
+    (recording,) = imported(tmp_path / "a.csv", text, sensors={"*": flat_sensor("a", 1, 1, 1e-3)})
+    for name, first in (("thumb", 0), ("index", 6)):
+        readings = recording.modules[name].readings
+        np.testing.assert_array_equal(readings[:, 0], READINGS[:, first : first + 3])
 
 
 def test_the_head_of_a_file_is_read_twice_at_most(tmp_path, monkeypatch):

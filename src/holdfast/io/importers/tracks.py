@@ -223,12 +223,14 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
         groups = of_names.named_groups(names, ())
     units = {unit for of in READING_UNITS.values() for unit in of} | {None}
     has_imu = {"a", "g"} <= {word for group in groups for word in group.words}
+    wrenches = [group.words - {"f"} for group in groups if "f" in group.words]
     others = {}
     for group in groups:
-        is_imu = has_imu and group.words <= {"a", "g"}
-        what = of_names.quantity_of(group.words) or (
-            "accelerometer and gyroscope" if is_imu else None
-        )
+        what = of_names.quantity_of(group.words)
+        if has_imu and group.words <= {"a", "g"}:
+            what = "accelerometer and gyroscope"
+        elif "t" in group.words and group.words - {"t"} in wrenches:
+            what = "torque"
         if what or group.unit not in units:
             others[group] = what or f"in {group.unit}"
     groups = {group: cells for group, cells in groups.items() if group not in others}
