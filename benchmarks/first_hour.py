@@ -43,7 +43,7 @@ TASKS: dict[str, list[str]] = {
     "own npz file": ["holdfast import press.npz recordings", PASTE, "holdfast info recordings"],
     "own bag": [
         "holdfast import press-bag bags",
-        "holdfast import press-bag bags --topic /thumb/tactile=uskin-curved",
+        PASTE,
         "holdfast detect builtin:any bags/press-bag.parquet --summary",
     ],
     "array in Python": ["python array_of_readings.py"],

@@ -19,6 +19,7 @@ from holdfast.io.importers import IF_IN_CONTACT
 from holdfast.io.importers.columns import Columns
 from holdfast.io.importers.reading import ANY_MODULE, ForeignFile, recordings_of
 from holdfast.io.importers.table import first_texts
+from holdfast.io.proposals import ProposalError
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, xela_models
 from holdfast.sensors.types import Array
@@ -39,6 +40,8 @@ MIN_DRIFT = 1e-3
 """Smallest relative difference of the clocks of a device and a bag that is noted."""
 CLOCKS = ("device", "header", "bag")
 """Clocks that the times of a recording can come from, best first."""
+MAX_PROPOSAL_MESSAGES = 300_000
+"""Bags with more messages are not read for a proposal alone."""
 ONE_CLOCK_DIFFERENCE = 1.0
 """Topics whose clocks differ by more, compared with the bag's clock, have two clocks [s]."""
 
@@ -84,13 +87,24 @@ def read(
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
+        known = _BagImport(path, bag)
         if not sensors and not columns:
-            yield _BagImport(path, bag).recording(report)
-            return
+            if known.topics:
+                yield known.recording(report)
+                return
+            if sum(topic.n_messages for topic in bag.topics) > MAX_PROPOSAL_MESSAGES:
+                raise known.no_topic()
         wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
         arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
     source = ForeignFile(path, arrays, "--topic")
-    yield from recordings_of(source, wanted, columns, report, accept=accept)
+    try:
+        yield from recordings_of(source, wanted, columns, report, accept=accept)
+    except ProposalError:
+        raise
+    except RecordingError as cause:
+        if sensors or columns:
+            raise
+        raise known.no_topic() from cause
 
 
 def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
@@ -206,9 +220,11 @@ class _BagImport:
         self._bag = bag
         self._tracks: dict[tuple[str, int], _DeviceTrack] = {}
         self._n_undated = 0
+        self._others: list[str] = []
+        self.topics = self._tactile_topics()
 
     def recording(self, report: Callable[[str], None]) -> Recording:
-        topics = self._tactile_topics()
+        topics = self.topics
         for topic in topics:
             if topic.decode.note:
                 report(f"{topic.name}: {topic.decode.note}")
@@ -233,23 +249,24 @@ class _BagImport:
 
     def _tactile_topics(self) -> list[_TactileTopic]:
         topics: dict[str, _TactileTopic] = {}
-        others: list[str] = []
         for part in self._bag.topics:
             decode = None
             if part.definition is not None:
                 with suppress(ValueError):  # messages of another kind
                     decode = SampleDecoder(part.definition, ros2=self._bag.ros2)
             if decode is None:
-                others.append(f"{part.name} ({part.kind})")
+                self._others.append(f"{part.name} ({part.kind})")
             else:
                 topic = _TactileTopic(part.name, part.kind, decode, [])
                 topics.setdefault(part.name, topic).parts.append(part)
-        if not topics:
-            raise RecordingError(
-                f"{self._path} has no topic of a supported tactile sensor; it has "
-                f"{first_texts(others)}; for numbers x, y, z of any topic: --topic /TOPIC=SENSOR"
-            )
         return list(topics.values())
+
+    def no_topic(self) -> RecordingError:
+        """Return the error of a bag without a topic of a known sensor."""
+        return RecordingError(
+            f"{self._path} has no topic of a supported tactile sensor; it has "
+            f"{first_texts(self._others)}; for numbers x, y, z of any topic: --topic /TOPIC=SENSOR"
+        )
 
     def _read(self, topics: list[_TactileTopic]) -> None:
         """Read the samples of all topics, in the order of time."""

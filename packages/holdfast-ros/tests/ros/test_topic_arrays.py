@@ -125,6 +125,19 @@ def test_two_topics_are_two_modules(tmp_path):
     assert caught.value.proposal.options({}) == options
 
 
+def test_without_a_sensor_the_topics_are_proposed(tmp_path):
+    path = written(
+        tmp_path,
+        {name: lambda bag, k: numbers(bag, READINGS[k]) for name in ("/l/skin", "/r/skin")},
+    )
+    with pytest.raises(ProposalError) as caught:
+        list(import_recordings(path))
+    options = ["--topic", "/l/skin/data=anyskin", "--topic", "/r/skin/data=anyskin"]
+    assert caught.value.proposal.options({}) == options
+    (recording,) = import_recordings(path, accept=True)
+    assert list(recording.modules) == ["l", "r"]
+
+
 def test_topics_are_not_paired_by_row_number(tmp_path):
     """One that starts late keeps its times, and one with a message less stays."""
     path = written(
