@@ -16,6 +16,9 @@
 /* Share of the largest load so far that a touch exceeds: a contact begins above 0.12 of it, and
  * ends below 0.08, the echo that a released skin may still show (motion.c). */
 #define HF_TOUCH_SHARE ((hf_real)1.5 * HF_RELEASED_SHARE)
+/* Share of the load that lasted which a release may leave for seconds: in the twin 14 % after a hold
+ * of half a minute. */
+#define HF_ECHO_SHARE ((hf_real)0.16)
 /* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
  * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
 #define HF_REST_SECONDS 0.2
@@ -57,10 +60,10 @@ static bool hf_is_unloaded(
  * sooner than what is left goes. */
 static bool hf_is_echo(const hf_finger *f, holdfast_decision *d, hf_real load)
 {
-    /* s(k) = s(k-1) + (T / tau) (load(k) - s(k-1)). In contact: load < 0.12 s. */
+    /* s(k) = s(k-1) + (T / tau) (load(k) - s(k-1)). In contact: load < 0.16 s. */
     d->smoothed = isnan(d->smoothed) ? load : d->smoothed;
     d->smoothed += hf_min(1, f->hand->period / HF_FOLLOW_SECONDS) * (load - d->smoothed);
-    return hf_was_in_contact(d) && load < HF_TOUCH_SHARE * d->smoothed;
+    return hf_was_in_contact(d) && load < HF_ECHO_SHARE * d->smoothed;
 }
 
 /* Return how far the normal force fell below that of the first sample. */
