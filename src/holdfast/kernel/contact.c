@@ -16,9 +16,10 @@
 /* Share of the largest load so far that a touch exceeds: a contact begins above 0.12 of it, and
  * ends below 0.08, the echo that a released skin may still show (motion.c). */
 #define HF_TOUCH_SHARE ((hf_real)1.5 * HF_RELEASED_SHARE)
-/* Share of the load that lasted which a release may leave for seconds: in the twin 14 % after a hold
- * of half a minute. */
-#define HF_ECHO_SHARE ((hf_real)0.16)
+/* Share of a load that fell at once, in this time [s] at least and twice of it at most, which a
+ * release may leave for seconds: in the twin 14 % after a hold of half a minute. */
+#define HF_FALL_SHARE ((hf_real)0.145)
+#define HF_FALL_SECONDS 0.5
 /* A force is at rest if it has not moved, or not been shaken, for this time [s]. So long after a
  * release, the echo is below HF_RELEASED_SHARE in 95 % of the cases (docs/study/tries.md). */
 #define HF_REST_SECONDS 0.2
@@ -58,12 +59,21 @@ static bool hf_is_unloaded(
  *
  * A skin creeps back from a load that lasted, and its tare has drifted since: the peak is forgotten
  * sooner than what is left goes. */
-static bool hf_is_echo(const hf_finger *f, holdfast_decision *d, hf_real load)
+static bool hf_is_echo(const hf_finger *f, holdfast_decision *d, hf_real load, double time)
 {
-    /* s(k) = s(k-1) + (T / tau) (load(k) - s(k-1)). In contact: load < 0.16 s. */
+    /* s(k) = s(k-1) + (T / tau) (load(k) - s(k-1)); h: the largest load of this block of time and
+     * of the one before. In contact: load < max(0.12 s, 0.145 h). */
     d->smoothed = isnan(d->smoothed) ? load : d->smoothed;
     d->smoothed += hf_min(1, f->hand->period / HF_FOLLOW_SECONDS) * (load - d->smoothed);
-    return hf_was_in_contact(d) && load < HF_ECHO_SHARE * d->smoothed;
+    if (!(time - d->block_start < HF_FALL_SECONDS)) {
+        d->block_start = time;
+        d->loads[0] = d->loads[1];
+        d->loads[1] = 0;
+    }
+    d->loads[1] = hf_max(d->loads[1], load);
+    const hf_real highest = hf_max(d->loads[0], d->loads[1]);
+    return hf_was_in_contact(d) &&
+           load < hf_max(HF_TOUCH_SHARE * d->smoothed, HF_FALL_SHARE * highest);
 }
 
 /* Return how far the normal force fell below that of the first sample. */
@@ -123,7 +133,7 @@ static int hf_contact_by_load(
     /* What a release leaves is no touch until it rises by half: peak >= echo / 0.08. */
     const hf_real load = m->contact_load;
     const hf_real of_echo = hf_was_in_contact(d) ? 0 : d->echo / HF_RELEASED_SHARE;
-    const bool is_echo = hf_is_echo(f, d, load);
+    const bool is_echo = hf_is_echo(f, d, load, time);
     const bool is_small = hf_is_unloaded(d, load, hf_max(peak, of_echo), threshold);
     if (!is_small && !is_echo) {
         d->loaded_at = time;

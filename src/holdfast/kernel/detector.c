@@ -122,7 +122,7 @@ HF_SHARED void hf_start_decision(holdfast_decision *d)
     d->probability = d->smoothed = d->filtered = HF_NAN;
     d->slip_log_odds = d->slip_probability = d->speed = d->distance = HF_NAN;
     d->candidate_since = d->last_unstable = d->restless_at = d->filtered_at = NAN;
-    d->last_slip = d->slid_at = NAN;
+    d->last_slip = d->slid_at = d->block_start = NAN;
     d->shaken_at = d->loaded_at = -INFINITY;
 }
 

@@ -261,6 +261,8 @@ typedef struct {
     double candidate_since;   /* [s] */
     double last_unstable;     /* last sample that was unstable before the hold time [s] */
     hf_real smoothed;         /* F_a over 1 s, or the load over 3 s; NaN before */
+    double block_start;       /* of a block of 0.5 s [s]; NaN before */
+    hf_real loads[2];         /* largest loads of the block before, and of this one */
     double restless_at;       /* when the finger was last not calm [s] */
     hf_real rest[3];          /* F_tip without contact, beyond the tare */
     hf_real peak;             /* largest load so far, slowly forgotten */

@@ -74,6 +74,7 @@ def test_a_finger_is_not_stable_once_its_force_has_gone(rest):
 CLOSED = ((1, 0), (0.3, 1), (12, 1))
 OPENED = {
     "9 % that creep": ((0.2, 0.09), (1, 0.07), (4, 0.06)),
+    "14 % after a long hold": ((0.2, 0.14), (4, 0.12)),
     "4 % that stay for longer than the peak": ((0.2, 0.07), (1, 0.05), (2, 0.04), (40, 0.04)),
     "7 % that drift to 9": ((0.2, 0.07), (10, 0.09)),
     "4 % that drift to 30": ((0.2, 0.04), (60, 0.3)),
