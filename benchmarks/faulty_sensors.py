@@ -228,12 +228,12 @@ def recordings_of(folder: Path) -> Iterator[Recording]:
 
 
 def release(recording: Recording, finger: str) -> float:
-    """Return when a finger leaves its object for the rest of a recording [s]; else inf."""
+    """Return when a finger that began open leaves its object for good [s]; else inf."""
     if recording.truth is None or finger not in recording.truth.fingers:
         return np.inf
     touches = recording.truth.fingers[finger]["contact_force"].any(axis=1)
     times = recording.truth.times
-    last = np.flatnonzero(touches)[-1] if touches.any() else len(times) - 1
+    last = np.flatnonzero(touches)[-1] if touches.any() and not touches[0] else len(times) - 1
     return float(times[last]) if times[-1] - times[last] > RELEASE_TIME else np.inf
 
 

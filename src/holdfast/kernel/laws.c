@@ -77,9 +77,9 @@ static bool hf_has_three_readings(const holdfast_laws *w, size_t left_out)
     return false;
 }
 
-/* Return whether enough channels vary without a lane: change now, or did when their taxel last did,
- * while readings returned. */
-static bool hf_do_vary(const hf_finger *f, size_t left_out)
+/* Return how many channels vary without a lane: change now, or did when their taxel last did, while
+ * readings returned. */
+static size_t hf_count_varying(const hf_finger *f, size_t left_out)
 {
     size_t n_varying = 0;
     for (size_t i = 0; i < f->n_taxels; ++i) {
@@ -89,7 +89,7 @@ static bool hf_do_vary(const hf_finger *f, size_t left_out)
             n_varying += f->readings[k] != f->previous[k] || (is_recent && f->changes[k] != 0);
         }
     }
-    return n_varying >= (left_out < HF_LANES ? HF_MIN_RETURNED : HF_MIN_VARYING);
+    return n_varying;
 }
 
 /* Return whether readings return in order, of all taxels but those of one lane at most.
@@ -125,7 +125,8 @@ static bool hf_return(const hf_finger *f)
         left_out = n_equal > 1 ? (size_t)HF_LANES : left_out; /* all returned */
         if (n_equal > 0 && hf_has_three_readings(w, left_out)) {
             w->n_left = HF_RUN;
-            w->is_repeated = w->is_repeated || hf_do_vary(f, left_out);
+            const size_t least = left_out < HF_LANES ? HF_MIN_RETURNED : HF_MIN_VARYING;
+            w->is_repeated = w->is_repeated || hf_count_varying(f, left_out) >= least;
         }
     }
     for (size_t l = 0; is_mark && l < HF_LANES; ++l) {
@@ -150,7 +151,8 @@ HF_SHARED void hf_forget_returns(const hf_finger *f)
 static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan, bool is_wide)
 {
     /* Frozen: more than half of the wide updates before the rest changed it, 0.5 s of them at
-     * least, and the rest lasts max(0.5 s, 10 (longest rest before + 1 sample)) of them. */
+     * least, and the rest lasts max(0.5 s, 10 (longest rest before + 1 sample)) of them. Of few
+     * channels that vary, those of an axis may rest by chance. */
     holdfast_laws *const w = f->laws;
     const hf_real *const now = scan->axes;
     const hf_real then[3] = {w->axes[0], w->axes[1], w->axes[2]};
@@ -161,6 +163,7 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan, bool is_w
         return false; /* as usual */
     }
     const hf_real least = HF_FROZEN_SECONDS / f->hand->period;
+    const size_t n_least = f->n_taxels < HF_MIN_VARYING ? f->n_taxels : HF_MIN_VARYING;
     bool is_stuck = false;
     w->is_resting = false;
     for (size_t axis = 0; axis < 3; ++axis) {
@@ -168,7 +171,8 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan, bool is_w
         const int64_t same = w->n_same[axis], n_changed = w->n_wide - w->n_rested[axis];
         const hf_real limit = HF_FROZEN_RATIO * (hf_real)(w->longest_rest[axis] + 1);
         const bool is_frozen = 2 * n_changed > w->n_wide - same && (hf_real)n_changed >= least &&
-                               (hf_real)same >= hf_max(least, limit);
+                               (hf_real)same >= hf_max(least, limit) &&
+                               hf_count_varying(f, HF_LANES) >= n_least;
         if (is_new && same > w->longest_rest[axis] && !is_frozen) {
             w->longest_rest[axis] = same;
         }
