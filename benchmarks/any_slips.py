@@ -121,10 +121,15 @@ def rival_threshold(handling: Sequence[Recording], scores: Scores, model: Model)
     return 1.0 if index is None else float(SLIP_THRESHOLDS[index])
 
 
+def shares(metrics: SlipMetrics) -> list[float | None]:
+    """Return what is found before 1 mm, within 0.05 and 0.1 s [%], and false alarms a minute."""
+    within = [metrics.incipient[limit] for limit in ("0.05", "0.1")]
+    return [metrics.before_1mm, *within, metrics.false_alarms_per_minute["held"]]
+
+
 def row(part: str, name: str, metrics: SlipMetrics) -> str:
-    rate = metrics.false_alarms_per_minute["held"] or 0.0
-    cells = (metrics.before_1mm or 0.0, metrics.incipient["0.1"] or 0.0)
-    numbers = " | ".join(f"{cell:.0f}" for cell in cells)
+    *found, rate = (value or 0.0 for value in shares(metrics))
+    numbers = " | ".join(f"{cell:.0f}" for cell in found)
     auc = metrics.auc or float("nan")
     return (
         f"| {part} | {name} | {numbers} | {rate:.2f} | {auc:.2f} | {metrics.n} | "
@@ -180,22 +185,18 @@ RIVALS = {
 def main(options: argparse.Namespace) -> None:
     model = Model.load(options.model)
     totals: dict[tuple[str, str], list[SlipCounts]] = {}
-    titles = ("part", "by", "before 1 mm [%]", "within 0.1 s [%]", "false alarms a held minute",
-              "AUC", "slips", "over 1 mm", "min")  # fmt: skip
-    print(f"| {' | '.join(titles)} |\n|---|---|{'--:|' * 7}")
+    titles = ("part", "by", "before 1 mm [%]", "within 0.05 s [%]", "within 0.1 s [%]",
+              "false alarms a held minute", "AUC", "slips", "over 1 mm", "min")  # fmt: skip
+    print(f"| {' | '.join(titles)} |\n|---|---|{'--:|' * 8}")
     for hand in range(options.hands):
         for (part, title), counts in counts_of_hand(hand, model, options).items():
             totals.setdefault((part, title), []).append(counts[0])
             print(row(f"{part}, hand {hand}", title, slip_metrics(counts[0])), flush=True)
     for (part, title), counts in totals.items():
-        values = [slip_metrics(x) for x in counts]
+        values = np.array([shares(slip_metrics(x)) for x in counts], float)
         ranges = ", ".join(
-            f"{min(v):.3g} to {max(v):.3g}"
-            for v in (
-                [m.before_1mm or 0.0 for m in values],
-                [m.incipient["0.1"] or 0.0 for m in values],
-                [m.false_alarms_per_minute["held"] or 0.0 for m in values],
-            )
+            f"{low:.3g} to {high:.3g}"
+            for low, high in zip(np.nanmin(values, 0), np.nanmax(values, 0), strict=True)
         )
         pooled = slip_metrics(SlipCounts.total(counts))
         print(row(f"{part}, all {len(counts)}", f"{title} ({ranges})", pooled))

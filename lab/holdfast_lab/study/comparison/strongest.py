@@ -106,8 +106,8 @@ def measure_rows(plan: StudyPlan, results: Results, measure: Measure) -> Iterato
         return
     titles = method_titles(plan)
     # Chosen for each measure and group alone: the rival is the best at the very thing shown.
-    for group, names in ((FAMILY, PAPER_FAMILY), (EVERY, tuple(known))):
-        best = _fewest_errors({n: known[n] for n in names if n in known and n != OURS})
+    for group, names in ((FAMILY, PAPER_FAMILY), (EVERY, RIVALS)):
+        best = _fewest_errors({n: known[n] for n in names if n in known})
         if best is None:
             continue
         keys: dict[str, Key] = {"on": SPLIT_TITLES[key], "error": measure.title}

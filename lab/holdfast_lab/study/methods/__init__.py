@@ -7,7 +7,7 @@ from holdfast_lab.study.methods.force_rules import (
     SPECTRUM,
     TANGENTIAL,
 )
-from holdfast_lab.study.methods.holdfast import HOLDFAST
+from holdfast_lab.study.methods.holdfast import HOLDFAST, ONE_FINGER
 from holdfast_lab.study.methods.learning import ANYSKIN, JAMES_LEPORA
 from holdfast_lab.study.methods.method import (
     HAND,
@@ -41,6 +41,7 @@ METHODS: dict[str, Method] = {
         LOG_HAND,
         ENERGY,
         HOLDFAST,
+        *ONE_FINGER,
         ZHANG,
         FRICTION_METHOD,
         SLIP_SERVO,
@@ -56,6 +57,8 @@ METHODS: dict[str, Method] = {
 }
 """All methods by name, in the order of the tables."""
 
+RIVALS = tuple(name for name, method in METHODS.items() if method.category != "holdfast")
+"""Names of the methods that are not ours."""
 PAPER_FAMILY = tuple(name for name, method in METHODS.items() if method.category == "paper")
 """Names of the paper's method and of its variants. Ours is compared with the best of them."""
 
@@ -63,6 +66,7 @@ __all__ = [
     "HAND",
     "METHODS",
     "PAPER_FAMILY",
+    "RIVALS",
     "FingerSignal",
     "HandSignal",
     "Method",

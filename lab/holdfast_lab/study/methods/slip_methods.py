@@ -7,16 +7,13 @@ fitted to the labels of stability and used as a decision about slip.
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from holdfast_lab.study.methods import METHODS
+from holdfast_lab.study.methods import METHODS, RIVALS
 from holdfast_lab.study.methods.holdfast import HOLDFAST
 from holdfast_lab.study.methods.method import Method
 from holdfast_lab.study.methods.wavelets import TREES
 
 Target = Literal["sliding", "stability"]
 """What a method is fitted to: true sliding of a finger, or the labels of stability."""
-
-RIVALS = tuple(name for name in METHODS if name != "holdfast")
-"""Names of the other methods, of `METHODS`."""
 
 
 @dataclass(frozen=True)
