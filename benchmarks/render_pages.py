@@ -1,21 +1,22 @@
-"""Write the pages of docs/study/ whose figures come from single programs.
+"""Write the tables of docs/ whose figures come from single programs.
 
     python benchmarks/render_pages.py
 
-docs/study/NAME.md is written from docs/study/sources/NAME.md.j2 and NAME.json in the same folder.
-Change these, not the page. A template has no table of its own: `{{ table("NAME") }}` writes one,
-with the command that made it, the revision it was measured with and the date, and
-`{{ cell("NAME", ROW, COLUMN) }}` one of its figures. `ROW` is the beginning of a row, cell by cell.
+A table stands below its mark, `<!--FILE.TABLE-->`: it is the one of that name in
+docs/study/sources/FILE.json, with the command that made it, the revision it was measured with and
+the date. Change the file, not the table. A new table needs its mark alone.
 """
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-STUDY = Path(__file__).parents[1] / "docs" / "study"
+DOCS = Path(__file__).parents[1] / "docs"
+SOURCES = DOCS / "study" / "sources"
+MARK = re.compile(r"<!--([\w-]+)\.(\w+)-->\n(?:\n(?:\|.*\n)+\n`.*\n)?")
+"""A mark, with its table and the line below it if they are there."""
 
 
 def table_text(table: Mapping[str, Any]) -> str:
@@ -31,39 +32,34 @@ def table_text(table: Mapping[str, Any]) -> str:
     return "\n".join([*texts, "", f"{program} ({table['revision']}, {table['date']})."])
 
 
-def cell_text(table: Mapping[str, Any], row: str | list[str], column: str) -> str:
-    """Return one cell of a table.
+def read_tables(sources: Path = SOURCES) -> dict[tuple[str, str], dict[str, Any]]:
+    """Return the tables of all files, by file and name."""
+    return {
+        (path.stem, name): table
+        for path in sorted(sources.glob("*.json"))
+        for name, table in json.loads(path.read_text("utf-8")).items()
+    }
+
+
+def render(page: str, tables: Mapping[tuple[str, str], Mapping[str, Any]]) -> str:
+    """Return a page with the tables of its marks.
 
     Raises:
-        LookupError: the table has not exactly one such row.
-        ValueError: the table has no such column.
+        KeyError: no file has such a table.
     """
-    start = [row] if isinstance(row, str) else row
-    found = [cells for cells in table["rows"] if cells[: len(start)] == start]
-    if len(found) != 1:
-        raise LookupError(f"one row expected for {start}, {len(found)} found")
-    return found[0][table["columns"].index(column)]
 
+    def with_table(mark: re.Match[str]) -> str:
+        file, name = mark.groups()
+        return f"<!--{file}.{name}-->\n\n{table_text(tables[file, name])}\n"
 
-def render(sources: Path) -> dict[str, str]:
-    """Return the text of each page, by its name."""
-    environment = Environment(
-        loader=FileSystemLoader(sources), undefined=StrictUndefined, keep_trailing_newline=True
-    )
-    pages = {}
-    for path in sorted(sources.glob("*.json")):
-        tables = json.loads(path.read_text("utf-8"))
-        pages[path.stem] = environment.get_template(f"{path.stem}.md.j2").render(
-            table=lambda name, tables=tables: table_text(tables[name]),
-            cell=lambda name, row, column, tables=tables: cell_text(tables[name], row, column),
-        )
-    return pages
+    return MARK.sub(with_table, page)
 
 
 def main() -> None:
-    """Write all pages."""
-    for name, text in render(STUDY / "sources").items():
-        (STUDY / f"{name}.md").write_text(text, encoding="utf-8")
+    """Write all tables."""
+    tables = read_tables()
+    for path in DOCS.rglob("*.md"):
+        path.write_text(render(path.read_text("utf-8"), tables), encoding="utf-8")
 
 
 if __name__ == "__main__":

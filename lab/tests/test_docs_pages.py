@@ -1,6 +1,5 @@
-"""The pages of docs/study/ with a source in docs/study/sources/ are what it gives."""
+"""Tables with figures in docs/ are made from published files, or their page has a reason here."""
 
-import json
 import re
 
 import pytest
@@ -8,43 +7,81 @@ import pytest
 from benchmark_script import ROOT, load
 
 script = load("render_pages")
-STUDY = ROOT / "docs" / "study"
-SOURCES = STUDY / "sources"
-NAMES = sorted(path.stem for path in SOURCES.glob("*.json"))
+DOCS = ROOT / "docs"
+TABLES = script.read_tables()
+PAGES = {p.relative_to(ROOT).as_posix(): p.read_text("utf-8") for p in DOCS.rglob("*.md")}
+PAGES["README.md"] = (ROOT / "README.md").read_text("utf-8")
 FIELDS = {"columns", "rows", "command", "revision", "date"}
+BY_OTHER_TESTS = {
+    "README.md": "test_docs_study.py and test_docs_trial.py: its rows quote the files",
+    "docs/study/performance.md": "each row has its command; times are of a machine",
+    "docs/study.md": "test_docs_study.py",
+    "docs/study/paper.md": "test_docs_study.py",
+    "docs/study/real-data.md": "test_docs_study.py",
+    "docs/study/grip-trials.md": "test_docs_trial.py",
+}
+"""Pages whose figures come from another place."""
+MEASURE_NOTHING = {
+    "docs/sensors.md": "sizes and rates of data sheets, whose source is in the row",
+    "docs/teach.md": "the length of the steps",
+    "docs/grip.md": "settings and their defaults",
+    "docs/twin.md": "settings of the profiles",
+    "docs/metrics.md": "limits of the words of a verdict",
+}
+"""Pages with a table of numbers that no program measures."""
+TABLE = re.compile(r"(?:^\|.*\n)+", re.M)
+NUMBER = re.compile(r"\W*\d")
 
 
-def test_the_pages_are_what_the_sources_give():
-    for name, text in script.render(SOURCES).items():
-        assert (STUDY / f"{name}.md").read_text("utf-8") == text, (
-            f"docs/study/{name}.md differs: run python benchmarks/render_pages.py"
-        )
+def has_figures(table):
+    """Whether a third of the cells beside the first column begin with a number."""
+    rows = [re.split(r"(?<!\\)\|", line.strip("|\n")) for line in table.splitlines()[2:]]
+    cells = [cell for row in rows for cell in row[1:]]
+    return 3 * sum(bool(NUMBER.match(cell)) for cell in cells) >= len(cells) > 0
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_table_comes_from_the_figures_with_their_source(name):
-    template = (SOURCES / f"{name}.md.j2").read_text("utf-8")
-    assert not re.search(r"^\|", template, re.M)
-    tables = json.loads((SOURCES / f"{name}.json").read_text("utf-8"))
-    assert set(re.findall(r'table\("(\w+)"\)', template)) == set(tables)
-    for table in tables.values():
+def unmarked(text):
+    """Return the tables with figures that stand below no mark."""
+    return [x for x in TABLE.findall(script.MARK.sub("", text)) if has_figures(x)]
+
+
+def test_the_tables_are_those_of_the_files():
+    for name, text in PAGES.items():
+        assert script.render(text, TABLES) == text, f"{name}: run python benchmarks/render_pages.py"
+
+
+def test_every_table_with_figures_is_made_from_a_file():
+    by_hand = {name for name, text in PAGES.items() if unmarked(text)}
+    assert by_hand == set(BY_OTHER_TESTS) | set(MEASURE_NOTHING)
+
+
+def test_a_figure_that_no_file_gives_is_found():
+    page = "# Page\n\n| set | share |\n|---|--:|\n| a | 1 |\n\nText.\n"
+    assert len(unmarked(page)) == 1
+    tables = {("page", "sets"): TABLE_OF_SETS}
+    marked = script.render("# Page\n\n<!--page.sets-->\n\nText.\n", tables)
+    assert unmarked(marked) == [] and script.render(marked, tables) == marked
+    assert script.render(marked.replace("| b | 2 |", "| b | 3 |"), tables) == marked
+    with pytest.raises(KeyError):
+        script.render("<!--page.others-->\n", tables)
+
+
+def test_every_table_has_one_place_and_its_source():
+    marks = [mark for text in PAGES.values() for mark in script.MARK.findall(text)]
+    assert sorted(marks) == sorted(TABLES)
+    for table in TABLES.values():
         assert FIELDS <= set(table) <= FIELDS | {"at"}
         assert {len(cells) for cells in table["rows"]} == {len(table["columns"])}
         assert re.fullmatch(r"2026-\d\d-\d\d", table["date"])
         assert re.fullmatch(r"[0-9a-f]{8}|the revision of each row", table["revision"])
 
 
-TABLE = {"columns": ["set", "share"], "rows": [["a", "1"], ["b", "2"]], "command": "run",
-         "revision": "12345678", "date": "2026-11-27"}  # fmt: skip
+TABLE_OF_SETS = {"columns": ["set", "share"], "rows": [["a", "1"], ["b", "2"]], "command": "run",
+                 "revision": "12345678", "date": "2026-11-27"}  # fmt: skip
 
 
 def test_a_table_has_its_command_revision_and_date():
     rows = "| set | share |\n| --- | --- |\n| a | 1 |\n| b | 2 |\n\n"
-    assert script.table_text(TABLE) == f"{rows}`run` (12345678, 2026-11-27)."
-    assert script.table_text(TABLE | {"at": "abc"}).startswith(f"{rows}`run` at commit abc (1")
-
-
-def test_a_cell_is_of_one_row():
-    assert script.cell_text(TABLE, "b", "share") == "2"
-    with pytest.raises(LookupError, match=r"one row expected for \['c'\], 0 found"):
-        script.cell_text(TABLE, "c", "share")
+    assert script.table_text(TABLE_OF_SETS) == f"{rows}`run` (12345678, 2026-11-27)."
+    text = script.table_text(TABLE_OF_SETS | {"at": "abc"})
+    assert text.startswith(f"{rows}`run` at commit abc (1")

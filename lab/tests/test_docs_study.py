@@ -51,9 +51,14 @@ def test_the_readme_quotes_the_published_study(summary):
     assert f"unseen data of its own: {paper[0]}, {float(paper[1]):g} % |" in row
 
 
+def rows_of(file, table):
+    """Return the rows of a published table, each by its columns."""
+    source = json.loads((PUBLISHED / "sources" / f"{file}.json").read_text("utf-8"))[table]
+    return [dict(zip(source["columns"], row, strict=True)) for row in source["rows"]]
+
+
 def test_the_readme_quotes_the_test_of_hands_never_met():
-    source = json.loads((PUBLISHED / "sources" / "slips.json").read_text("utf-8"))["any"]
-    ours, rival = (dict(zip(source["columns"], source["rows"][k], strict=True)) for k in (0, 1))
+    ours, rival = rows_of("slips", "any")[:2]
     found, rate = (
         [row[name].split()[0] for row in (ours, rival)]
         for name in ("before 1 mm", "false alarms, held")
@@ -61,6 +66,23 @@ def test_the_readme_quotes_the_test_of_hands_never_met():
     row = row_of_readme("Is this finger of a hand never met slipping?")
     assert f"| {found[0]} %; {float(rate[0]):.1f} |" in row
     assert f"{rival['by']}: {found[1]} %; {float(rate[1]):.1f} |" in row
+
+
+def test_the_readme_quotes_the_real_recordings():
+    boxes, tugs, sliding = (rows_of("real-data", "sets")[k] for k in (0, 5, 6))
+    row = row_of_readme("And on real hands?")
+    assert f"| {boxes['calibrated']}. {sliding['calibrated']} |" in row
+    force, arm = (boxes[name].strip("*") for name in ("change of the force", "speed of the arm"))
+    tug = tugs["change of the force"].strip("*")
+    assert f"| change of force: {force}. {tug}; speed of the arm: {arm}." in row
+
+
+def test_the_page_of_slips_begins_with_its_figures():
+    page = (PUBLISHED / "slips.md").read_text("utf-8").partition("\n## ")[0]
+    slips = next(row for row in rows_of("slips", "fresh") if row["`builtin:twin`"] == "`slips`")
+    assert f"`builtin:twin` finds {slips['before 1 mm']} % of the slips over 1 mm" in page
+    found = rows_of("slips", "any")[0]["before 1 mm"].split()[0]
+    assert f"[{found} % before 1 mm]" in page
 
 
 ROWS = [

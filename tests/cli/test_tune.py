@@ -110,7 +110,7 @@ def test_evaluate_and_train_print_slips(capsys, sliding, grasps, tmp_path):
     rows = {line.split()[0]: line.split() for line in lines[place:] if line.strip()}
     assert rows["all"][1] == "32"
     assert rows["thumb"][1] == rows["index"][1] == "16"
-    assert rows["never"][1:] == ["32", rows["all"][2], *["0"] * 6, "0.00", "0.00", "0.500"]
+    assert rows["never"][1:] == ["32", rows["all"][2], *["0"] * 4, "0.00", "0.00", "0.500"]
     assert all(len(line) <= 80 for line in lines[:-1])
     words = ["-o", tmp_path / "m.json", "--trials", "0", "--shared"]
     assert "slips of fingers (by the truth)" in run(capsys, "train", sliding / "data", *words)[1]

@@ -28,15 +28,13 @@ NO_RULE = "slips of fingers: the model has no slip rule"
 UNKNOWN_SLIPS = "slips of fingers: not known in these recordings; the slip rule is not scored"
 KEPT_RULE = "slips of fingers: the slip rule of --init is kept; holdfast evaluate scores it"
 SHARES_NOTE = (
-    "Shares found [%]: before the onset; within 0.03, 0.05 and 0.1 s of it; of the slips over "
-    "1 mm, within 0.1 s and before they slid 1 mm. False alarms per minute of quiet hold and of "
-    "all held time."
+    "Micro: slips of at most 1 mm [%]. Shares found [%]: of the slips over 1 mm, before they slid "
+    "1 mm; of all slips, within 0.05 and 0.1 s of the onset, where alarms up to 0.5 s early count, "
+    "and before it. False alarms per minute of quiet hold and of all held time."
 )
 """Explanation of the columns of the scores of slips."""
 NEVER_NOTE = ' The row "never" is a model that never reports a slip.'
-SHARES_HEADER = (
-    "by onset", "0.03", "0.05", "0.1", "0.1, 1 mm", "before 1 mm", "quiet", "held",
-)  # fmt: skip
+SHARES_HEADER = ("micro", "before 1 mm", "0.05", "0.1", "by onset", "quiet", "held")
 
 
 def warn_about_recordings(evaluation: "Evaluation", n_recordings: int) -> None:
@@ -159,8 +157,8 @@ def print_slips(
     pooled = summary.pooled
     rows = [_finger_row(name, finger) for name, finger in summary.fingers.items()]
     rows.append(_finger_row("all", pooled))
-    rows.append(("never", *rows[-1][1:3], *never_cells(pooled), "0.500"))
-    print_table(("", "slips", "over 1 mm", *SHARES_HEADER, "AUC"), rows)
+    rows.append(("never", str(pooled.n), *never_cells(pooled), "0.500"))
+    print_table(("", "slips", *SHARES_HEADER, "AUC"), rows)
     print_paragraph(SHARES_NOTE)
     support = f"{pooled.quiet_minutes:.1f} min quiet of {pooled.held_minutes:.1f} min held"
     if pooled.raised_quiet is not None:
@@ -190,26 +188,30 @@ def origin_of(metrics: "EventMetrics | SlipMetrics") -> str:
 
 def share_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
     """Return the cells below `SHARES_HEADER`."""
-    rates = metrics.false_alarms_per_minute
-    shares = (*metrics.incipient.values(), metrics.over_1mm["0.1"], metrics.before_1mm)
+    rates, found = metrics.false_alarms_per_minute, metrics.incipient
+    shares = (metrics.before_1mm, found["0.05"], found["0.1"], found["before"])
     return (
+        _micro_cell(metrics),
         *(format_number(share, 0) for share in shares),
         *(format_number(rates[time], 2) for time in ("quiet", "held")),
     )
 
 
+def _micro_cell(metrics: "SlipMetrics") -> str:
+    # A label says when a finger slides, not how far.
+    if not metrics.n or metrics.onsets in ("labels", "rule"):
+        return "-"
+    return format_number(100 * (1 - metrics.n_over_1mm / metrics.n), 0)
+
+
 def never_cells(metrics: "SlipMetrics") -> tuple[str, ...]:
     """Return the cells below `SHARES_HEADER` of a model that never reports one of these slips."""
-    shares = ["0" if metrics.n else "-"] * (len(SHARES_HEADER) - 2)  # two are rates of false alarms
-    return (*shares, "0.00", "0.00")
+    shares = ["0" if metrics.n else "-"] * (len(SHARES_HEADER) - 3)  # two are rates of false alarms
+    return (_micro_cell(metrics), *shares, "0.00", "0.00")
 
 
 def _finger_row(name: str, metrics: "SlipMetrics") -> tuple[str, ...]:
-    # A label says when a finger slides, not how far.
-    n_over = "-" if metrics.onsets in ("labels", "rule") else str(metrics.n_over_1mm)
-    return (
-        name, str(metrics.n), n_over, *share_cells(metrics), format_number(metrics.auc, 3)
-    )  # fmt: skip
+    return name, str(metrics.n), *share_cells(metrics), format_number(metrics.auc, 3)
 
 
 def format_intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
@@ -217,10 +219,10 @@ def format_intervals(intervals: "SlipIntervals", *, chosen: bool) -> str:
     from holdfast.metrics.summary import LEVEL
 
     shares = {
-        "before the onset": intervals.incipient["before"],
-        "within 0.1 s": intervals.incipient["0.1"],
-        "over 1 mm within 0.1 s": intervals.over_1mm["0.1"],
         "before 1 mm": intervals.before_1mm,
+        "within 0.05 s": intervals.incipient["0.05"],
+        "within 0.1 s": intervals.incipient["0.1"],
+        "before the onset": intervals.incipient["before"],
     }
     rates = {
         f"false alarms of {name}": intervals.false_alarms_per_minute[name]

@@ -43,6 +43,7 @@ from holdfast.training.own_handling import check_shear
 from holdfast.training.splits import check_nothing_shared
 from holdfast.training.targets import TargetInput, TargetSamples, slip_target
 from holdfast.training.thresholds import N_SHOWN, CurvePoint
+from holdfast.training.verdict import slips_verdict
 
 WANTED_FALSE_ALARMS = 1.5
 """False alarms per minute of held time of a finger for which the threshold is set by default."""
@@ -121,16 +122,8 @@ class Taught:
 
     @property
     def verdict(self) -> str:
-        """What the taught head is good for on the next grasps of this hand, in one sentence."""
-        pooled, intervals = self.slips.pooled, self.slips.intervals
-        interval = None if intervals is None else intervals.incipient["0.1"]
-        known = "" if interval is None else " ({:.0f} to {:.0f})".format(*interval)
-        return (
-            f"{pooled.n} slips in {self.n_recordings} grasps: of those that it was not taught, "
-            f"{pooled.incipient['0.1'] or 0:.0f} %{known} are found within 0.1 s, at "
-            f"{pooled.false_alarms_per_minute['held'] or 0:.2g} false alarms a minute of held time "
-            f"of a finger, {self.hand_alarms:.2g} of the hand."
-        )
+        """What the taught head is worth on the next grasps of this hand."""
+        return slips_verdict(self.slips, self.n_recordings)
 
     def document(self, path: Path) -> dict[str, Any]:
         """Return the figures for JSON.

@@ -121,7 +121,7 @@ def verdict(
         lines.append(f"{tares}: see --tare.".capitalize())
     slips = metrics.slips
     if slips is not None and reports_slips:
-        lines.append(_of_slips(slips, n, in_sample=in_sample))
+        lines.append(slips_verdict(slips, n, in_sample=in_sample))
     elif slips is not None:
         auc = "" if slips.pooled.auc is None else f"; P(slip) has an AUC of {slips.pooled.auc:.2f}"
         silent = "none is reported until the model is calibrated (holdfast calibrate)"
@@ -186,7 +186,14 @@ def _of_stability(metrics: Metrics, n_recordings: int, *, in_sample: bool) -> st
     return f"Stability: {_line(USES, alarms, missed, 'within 0.2 s', support, notes)}"
 
 
-def _of_slips(summary: SlipSummary, n_recordings: int, *, in_sample: bool) -> str:
+def slips_verdict(summary: SlipSummary, n_recordings: int, *, in_sample: bool = False) -> str:
+    """Return the word and the numbers of slips.
+
+    Args:
+        summary: of the slips.
+        n_recordings: number of recordings with labels, without copies.
+        in_sample: the threshold was chosen on some of the recordings.
+    """
     slips, limits = summary.pooled, summary.intervals
     alarms = Bounded.rate(
         slips.false_alarms_per_minute["held"],

@@ -30,7 +30,7 @@ from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED_RATE,
     MethodEvaluation,
 )
-from holdfast_lab.study.methods import PAPER_FAMILY
+from holdfast_lab.study.methods import PAPER_FAMILY, RIVALS
 from holdfast_lab.study.plan import StudyPlan
 
 OURS = "holdfast"

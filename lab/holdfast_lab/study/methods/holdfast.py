@@ -24,7 +24,6 @@ from holdfast.sensors.types import Array
 from holdfast.training.classifiers import recipe
 from holdfast_lab.study.methods.method import HandSignal, Method
 
-
 FINGER_FEATURES = tuple(spec for spec in HOLDFAST_FEATURES if spec.scope == "finger")
 """Features of a finger that do not depend on the others."""
 

@@ -19,9 +19,9 @@ from holdfast.cli.terminal.console import (
 if TYPE_CHECKING:
     from holdfast.training.teaching import Taught
 
-CURVE_HEADER = ("--false-alarms", "threshold", "0.1", "before 1 mm", "finger", "hand")
+CURVE_HEADER = ("--false-alarms", "threshold", "before 1 mm", "0.1", "finger", "hand")
 CURVE_NOTE = (
-    "Other thresholds, out of fold: found within 0.1 s and before 1 mm [%], and false alarms a "
+    "Other thresholds, out of fold: found before 1 mm and within 0.1 s [%], and false alarms a "
     "minute of a finger and of the hand. Teach again with the option to move along them."
 )
 NO_SLIPS = (
@@ -47,8 +47,8 @@ def print_taught(taught: "Taught", base: str) -> None:
     print_line()
     points = [
         (
-            f"{point.wanted:g}", f"{point.threshold:.3f}", format_number(point.found, 0),
-            format_number(point.before_1mm, 0), format_number(point.false_alarms, 2),
+            f"{point.wanted:g}", f"{point.threshold:.3f}", format_number(point.before_1mm, 0),
+            format_number(point.found, 0), format_number(point.false_alarms, 2),
             f"{point.hand_false_alarms:.2f}",
         )
         for point in taught.curve
