@@ -25,6 +25,7 @@ SLOW_METHODS = ("jl_local_svm", "jl_global_svm")
 METHOD_SECONDS = {
     "svm": 60.0,
     "svm_unweighted": 60.0,
+    "finger_svm": 60.0,
     "trees": 300.0,
     "jl_local_svm": 150.0,
     "jl_global_svm": 230.0,
