@@ -12,7 +12,6 @@ from holdfast.metrics.slips import (
     LATEST_ALARM,
     SlipMetrics,
 )
-from holdfast.metrics.statistics import percent
 from holdfast.training.head_fits import SLIP_HOLD_TIME, SLIP_SMOOTHING
 from holdfast_lab.report.result_tables import Key, ResultTable, Row
 from holdfast_lab.study.comparison.jobs import SPLIT_TITLES, Results, method_effort
@@ -50,8 +49,6 @@ FALSE_HELD, FALSE_QUIET = "false alarms per minute held", "false alarms per minu
 FALSE_HAND = "false alarms per minute held, hand"
 QUIET_RAISED = "quiet hold raised [%]"
 N_SLIPS, N_GROSS, N_OVER_1MM = "n slips", "n gross", "n over 1 mm"
-MICRO_SLIPS = "micro-slips [%]"
-"""Share of the slips of at most 1 mm."""
 HELD_MINUTES = "held [min]"
 SLIP_DIGITS = {
     "AUC": 3,
@@ -163,7 +160,6 @@ def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
         N_SLIPS: pooled.n,
         N_GROSS: pooled.n_gross,
         N_OVER_1MM: pooled.n_over_1mm,
-        MICRO_SLIPS: percent(pooled.n - pooled.n_over_1mm, pooled.n),
         HELD_MINUTES: pooled.held_minutes,
     }
     return rows + [Row({**keys, "figure": name}, value, None, n) for name, value in counts.items()]
