@@ -68,6 +68,14 @@ def test_the_readme_quotes_the_test_of_hands_never_met():
     assert f"{rival['by']}: {found[1]} %; {float(rate[1]):.1f} |" in row
 
 
+def test_the_readme_quotes_the_hands_that_were_taught():
+    ours, *_, rival = (row["next grasps"].split("; ") for row in rows_of("teach", "hands"))
+    row = row_of_readme("And after `holdfast teach`?")
+    found, interval = ours[0].split(" ", 1)
+    assert f"| {found} % {interval}; {ours[-1]} |" in row
+    assert f"| the same: {rival[0].split()[0]} %; {rival[-1].split()[0]} |" in row
+
+
 def test_the_readme_quotes_the_real_recordings():
     boxes, tugs, sliding = (rows_of("real-data", "sets")[k] for k in (0, 5, 6))
     row = row_of_readme("And on real hands?")
