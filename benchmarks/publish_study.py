@@ -169,15 +169,6 @@ class Figures:
         ]
         return "\n".join(f"| {' | '.join(map(_escape, each))} |" for each in table_lines)
 
-    def ratio(self, table: str, first: Where, second: Where, digits: int = 2) -> str:
-        """Return the ratio of two shares of errors, 100 minus an accuracy [%]."""
-        if not (self.has(table, first) and self.has(table, second)):
-            return MISSING
-        one, other = self.value(table, first), self.value(table, second)
-        if one is None or other is None or other == 100:
-            return MISSING
-        return number_text((100 - one) / (100 - other), digits)
-
 
 def number_text(value: float | None, digits: int) -> str:
     """Return a number as text.
@@ -216,7 +207,7 @@ def render(summary: Mapping[str, Any], templates: Path) -> dict[str, str]:
         keep_trailing_newline=True,
     )
     figures = Figures(summary["tables"])
-    public = ("cell", "any_cell", "grid", "has", "ratio", "share_stable")
+    public = ("cell", "any_cell", "grid", "has", "share_stable")
     names = {name: getattr(figures, name) for name in public}
     names["compares_methods"] = lambda keys: not COMPARED_KEYS.isdisjoint(keys)
     return {

@@ -142,11 +142,6 @@ class TestFigures:
         share = figures.share_stable("t", {}, ("accuracy", "FNR", false))
         assert share == pytest.approx(40.0)
 
-    def test_a_ratio_of_errors(self):
-        b = {"method": "b", "figure": "y_z"}
-        assert self.figures.ratio("t", b, {"method": "a"}) == "0.20"
-        assert self.figures.ratio("t", b, {"method": "c"}) == "–"
-
 
 CSV = """method,figure,ours,paper,difference,n,low,high
 a,x,91.25,95.0,-3.75,2,90.0,
