@@ -103,6 +103,18 @@ def test_features_are_causal(method, recordings):
     assert not same(one, two, slice(k, None))
 
 
+@pytest.mark.parametrize(
+    ("name", "alone"),
+    [("finger_logreg", True), ("finger_svm", True), ("logreg", True), ("holdfast", False)],
+)
+def test_one_finger_alone_sees_no_other(name, alone, recordings):
+    modules = dict(recordings[0].modules)
+    modules["index"] = with_other_readings(recordings[0], slice(N_TARE, None)).modules["index"]
+    other = Recording("other", modules, recordings[0].metadata)
+    one, two = (features_of(METHODS[name], grasp)["thumb"] for grasp in (recordings[0], other))
+    assert np.allclose(one, two, equal_nan=True) == alone
+
+
 def test_features_restart_after_a_gap(method, recordings):
     """After a gap, features depend on no sample before it but those of the tare."""
     gap = slice(600, 610)
