@@ -1,5 +1,6 @@
 """Tasks whose results are stored, so that a stopped command continues where it stopped."""
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -114,16 +115,21 @@ class TaskRunner:
         by_name = {task.name: task for task in sorted(tasks, key=lambda task: -task.cost)}
         source = source_digest()  # sent along, because a worker may have another version
         calls = ((name, (source, *task[:3])) for name, task in by_name.items())
-        for name, data in self.engine.map_unordered(_call, calls):
+        for name, (data, seconds) in self.engine.map_unordered(_call, calls):
             # Decoded before it is stored: a result of another type than promised is no result.
             try:
                 result = msgpack.decode(data, type=by_name[name].result)
             except MsgspecError as cause:
                 kind = by_name[name].result
                 raise TypeError(f"{name} returned no {kind}: {cause}") from cause
-            stored = StoredResult(name, sha256(data).hexdigest(), Raw(data))
+            stored = StoredResult(name, sha256(data).hexdigest(), Raw(data), seconds)
             write_whole(self._path(keys[name]), msgpack.encode(stored), force=True)
             yield by_name[name], result
+
+    def seconds(self, tasks: Sequence[Task]) -> float:
+        """Return the processor time that the stored results of tasks took [s]."""
+        paths = {self._path(key) for key in _keys(tasks).values()}
+        return sum(msgpack.decode(path.read_bytes(), type=StoredResult).seconds for path in paths)
 
     def _remove_outdated(self, folder: Path) -> None:
         """Remove the results of another source."""
@@ -151,11 +157,12 @@ class TaskRunner:
 
 
 class StoredResult(Struct, frozen=True):
-    """A result on disk, with a digest of its bytes."""
+    """A result on disk, with a digest of its bytes and the processor time that it took [s]."""
 
     task: str
     digest: str
     result: Raw
+    seconds: float
 
 
 @lru_cache
@@ -190,13 +197,18 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
 
 def _call(
     source: str, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]
-) -> bytes:
-    """Return the encoded result of a function; the worker must have the same source."""
+) -> tuple[bytes, float]:
+    """Return the encoded result of a function, and its processor time [s].
+
+    The worker must have the same source.
+    """
+    start = time.process_time()
     try:
         if source != source_digest():
             raise EngineError("the version of holdfast of its worker differs from this one")
         with one_thread():
-            return msgpack.encode(function(*arguments), enc_hook=_to_builtin)
+            data = msgpack.encode(function(*arguments), enc_hook=_to_builtin)
+            return data, time.process_time() - start
     except Exception as failure:
         # Put the name of a task before the text of an exception, or into a note.
         match failure.args:

@@ -93,8 +93,9 @@ def run_study(
     start = time.perf_counter()
     skipped = () if plan.full or plan.quick else ONLY_FULL
     parts = {name: part for name, part in PARTS.items() if name not in skipped}
-    tasks = [task for part in parts.values() for task in part.tasks(plan)]
-    results = TaskRunner(Path(out), engine, progress, notify).run(tasks)
+    tasks = {name: part.tasks(plan) for name, part in parts.items()}
+    runner = TaskRunner(Path(out), engine, progress, notify)
+    results = runner.run([task for of_part in tasks.values() for task in of_part])
     notify("making tables and figures")
     outputs = {
         name: PartOutput(part.tables(plan, results), part.figures(plan, results))
@@ -110,7 +111,10 @@ def run_study(
         "versions": versions(),
         "machine": machine(),
         "seconds": {name: round(value, 1) for name, value in seconds.items()},
-        "tasks": len(tasks),
+        "tasks": len(results),
+        "processor_minutes": {
+            name: round(runner.seconds(of_part) / 60, 1) for name, of_part in tasks.items()
+        },
         "left_out": [*left_out, *whole_hand_note(plan), *full_note(skipped)],
     }
     sources = [f"{title}: {METHODS[name].source}." for name, title in method_titles(plan).items()]
