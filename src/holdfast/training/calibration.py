@@ -23,6 +23,7 @@ from holdfast.training.own_handling import (
     location_and_scale,
 )
 from holdfast.training.thresholds import (
+    STABLE_SHARE,
     GraspingFinger,
     GraspingFingers,
     HandlingSlips,
@@ -40,6 +41,9 @@ STILL_CHANGE = 0.03
 MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
 """A feature changes if its location moves by this share of its scale, or its scale by this
 factor."""
+HIDDEN_SHARE = 0.5
+"""Share of the handling in which a feature is at its least value, median over the features, above
+which the spread of none is seen."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
 more in the held samples in which it does not slide; over half have more while they slide."""
@@ -100,13 +104,15 @@ class HandlingFigures(msgspec.Struct, frozen=True):
     def worse_than(self, other: "HandlingFigures") -> bool:
         """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
 
-        An alarm begins and ends with STABLE, so more of them are no worse where more samples are
-        STABLE: a finger that is never STABLE has no alarm.
+        STABLE may fall to the share for which the threshold is chosen: it is what pushes leave. An
+        alarm begins and ends with STABLE, so more of them are no worse where more samples are
+        STABLE, nor where they come from that fall: a finger that is never STABLE has no alarm.
         """
-        stable = self.stable - other.stable
+        aim = min(other.stable, 100 * STABLE_SHARE)
         raised = (self.raised or 0.0) - (other.raised or 0.0)
         more_alarms = self.alarms_per_minute > other.alarms_per_minute
-        return stable < -WORSE or raised > WORSE or (stable <= 0 and more_alarms)
+        alarms = more_alarms and self.stable <= other.stable == aim
+        return self.stable < aim - WORSE or raised > WORSE or alarms
 
 
 class HandlingSummary(msgspec.Struct, frozen=True):
@@ -423,6 +429,9 @@ class _Calibration:
             # of the default.
             location = np.maximum(location, part.default_handling[0])
             scale = _stretch(part, scale) * scale
+        elif np.median((features == features.min(axis=0)).mean(axis=0)) > HIDDEN_SHARE:
+            # Nor does handling that hardly shows over the steps of a sensor.
+            scale = np.maximum(scale, part.default_handling[1])
         return Handling(
             location=tuple(location.tolist()),
             scale=tuple(scale.tolist()),
