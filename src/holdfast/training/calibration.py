@@ -43,7 +43,7 @@ MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
 factor."""
 HIDDEN_SHARE = 0.5
 """Share of the handling in which a feature is at its least value, median over the features, above
-which the spread of none is seen."""
+which most of the handling does not show in the readings."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
 more in the held samples in which it does not slide; over half have more while they slide."""
@@ -377,7 +377,7 @@ class _Calibration:
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            slips[key] = choose_handling_slips(after[key], part, false_alarms)
+            slips[key] = choose_handling_slips(after[key], part, false_alarms, self._shown(key))
             chosen: dict[HeadName, float] = {one.head: one.threshold for one in slips[key]}
             chosen["stable"] = choose_stability_threshold(after[key], part, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
@@ -429,8 +429,7 @@ class _Calibration:
             # of the default.
             location = np.maximum(location, part.default_handling[0])
             scale = _stretch(part, scale) * scale
-        elif np.median((features == features.min(axis=0)).mean(axis=0)) > HIDDEN_SHARE:
-            # Nor does handling that hardly shows over the steps of a sensor.
+        elif self._shown(key) < 1:  # nor does handling below the steps of a sensor
             scale = np.maximum(scale, part.default_handling[1])
         return Handling(
             location=tuple(location.tolist()),
@@ -444,6 +443,15 @@ class _Calibration:
         _, scale = location_and_scale(self.seen.features(key))
         moves = self.seen.load_change(key) >= STILL_CHANGE  # not where it is unknown
         return not moves and _stretch(self.model.finger(key.finger), scale) > 1
+
+    def _shown(self, key: HandlingKey) -> float:
+        """Return the share of the handling that shows over the steps of a sensor, if most does not.
+
+        What is not felt says nothing about false alarms.
+        """
+        features = self.seen.features(key)
+        hidden = float(np.median((features == features.min(axis=0)).mean(axis=0)))
+        return 1.0 - hidden if hidden > HIDDEN_SHARE else 1.0
 
     def _decide(self, model: Model) -> dict[HandlingKey, GraspingFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
@@ -462,6 +470,12 @@ class _Calibration:
         return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
+        for key in self.keys:
+            if (shown := self._shown(key)) < 1:
+                yield (
+                    f"{key}: {100 * shown:.0f} % of this handling changes the readings by more "
+                    "than noise and steps, and only that counts for slips; push harder"
+                )
         for summary in sensors:
             if summary.seconds < ENOUGH_HANDLING:
                 yield (
