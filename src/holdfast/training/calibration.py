@@ -447,11 +447,11 @@ class _Calibration:
     def _shown(self, key: HandlingKey) -> float:
         """Return the share of the handling that shows over the steps of a sensor, if most does not.
 
-        What is not felt says nothing about false alarms.
+        What is not felt says nothing about false alarms. Still handling has a rule of its own.
         """
         features = self.seen.features(key)
         hidden = float(np.median((features == features.min(axis=0)).mean(axis=0)))
-        return 1.0 - hidden if hidden > HIDDEN_SHARE else 1.0
+        return 1.0 - hidden if hidden > HIDDEN_SHARE and not self._still(key) else 1.0
 
     def _decide(self, model: Model) -> dict[HandlingKey, GraspingFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
