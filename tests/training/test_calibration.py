@@ -177,7 +177,8 @@ def test_it_warns_of_little_and_of_still_handling(model):
     assert len(report.warnings) == 2
 
 
-def test_handling_that_the_steps_of_a_sensor_hide_shrinks_no_scale(model):
+def test_handling_that_the_steps_of_a_sensor_hide(model):
+    """It shrinks no scale, and bounds the false alarms of slips by what shows of it alone."""
     steps = dataclasses.replace(
         PAD, name="steps", range=(-40.0, 40.0), step=1.0, rests_at_zero=True
     )
@@ -190,11 +191,17 @@ def test_handling_that_the_steps_of_a_sensor_hide_shrinks_no_scale(model):
         stepped.append(Recording(recording.name, modules))
         own.add(stepped[-1])
     features = own.features(HandlingKey("*", "steps"))
-    assert np.median((features == features.min(axis=0)).mean(axis=0)) > 0.5
-    scale = handling_of(calibrate(model, stepped), "steps").scale
+    hidden = np.median((features == features.min(axis=0)).mean(axis=0))
+    assert hidden > 0.5
+    report = calibrate_with_report(model, stepped)
+    scale = handling_of(report.model, "steps").scale
     seen, default = location_and_scale(features)[1], model.fingers["*"].default_handling[1]
     assert (seen < default).sum() > 10
     np.testing.assert_array_equal(scale, np.maximum(seen, default))
+    (summary,), (whole,) = report.sensors, calibrate_with_report(model, DATA).sensors
+    shown = summary.slips[0].minutes / whole.slips[0].minutes
+    assert shown == pytest.approx(1 - hidden, rel=0.05)
+    assert any("push harder" in warning for warning in report.warnings)
 
 
 def test_false_alarms_are_those_of_slips(model, calibrated):
