@@ -104,9 +104,9 @@ class HandlingFigures(msgspec.Struct, frozen=True):
     def worse_than(self, other: "HandlingFigures") -> bool:
         """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
 
-        STABLE may fall to the share for which the threshold is chosen: it is what pushes leave. An
-        alarm begins and ends with STABLE, so more of them are no worse where more samples are
-        STABLE, nor where they come from that fall: a finger that is never STABLE has no alarm.
+        STABLE may fall to the share for which the threshold is chosen. An alarm begins and ends
+        with STABLE, so more of them are no worse where more samples are STABLE, or where STABLE
+        falls so: a finger that is never STABLE has no alarm.
         """
         aim = min(other.stable, 100 * STABLE_SHARE)
         raised = (self.raised or 0.0) - (other.raised or 0.0)
@@ -362,6 +362,7 @@ class _Calibration:
     def __init__(self, handling: OwnHandling, recordings: Sequence[Recording]) -> None:
         self.model, self.seen, self.recordings = handling.model, handling, recordings
         self.keys = [key for key in handling.samples if handling.seconds(key) >= MIN_HANDLING]
+        self.shown = {key: self._shown(key) for key in self.keys}
 
     def result(self, false_alarms: float) -> CalibratedModel:
         """Return the calibrated model, with what the calibration saw.
@@ -377,7 +378,7 @@ class _Calibration:
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            slips[key] = choose_handling_slips(after[key], part, false_alarms, self._shown(key))
+            slips[key] = choose_handling_slips(after[key], part, false_alarms, self.shown[key])
             chosen: dict[HeadName, float] = {one.head: one.threshold for one in slips[key]}
             chosen["stable"] = choose_stability_threshold(after[key], part, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
@@ -429,7 +430,7 @@ class _Calibration:
             # of the default.
             location = np.maximum(location, part.default_handling[0])
             scale = _stretch(part, scale) * scale
-        elif self._shown(key) < 1:  # nor does handling below the steps of a sensor
+        elif self.shown[key] < 1:  # nor does handling below the steps of a sensor
             scale = np.maximum(scale, part.default_handling[1])
         return Handling(
             location=tuple(location.tolist()),
@@ -470,8 +471,8 @@ class _Calibration:
         return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
-        for key in self.keys:
-            if (shown := self._shown(key)) < 1:
+        for key, shown in self.shown.items():
+            if shown < 1:
                 yield (
                     f"{key}: {100 * shown:.0f} % of this handling changes the readings by more "
                     "than noise and steps, and only that counts for slips; push harder"
