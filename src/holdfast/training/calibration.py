@@ -451,7 +451,9 @@ class _Calibration:
         What is not felt says nothing about false alarms. Still handling has a rule of its own.
         """
         features = self.seen.features(key)
-        hidden = float(np.median((features == features.min(axis=0)).mean(axis=0)))
+        rests = (features == features.min(axis=0)).mean(axis=0)
+        # One taxel has no residual: a feature that it never changes shows nothing anyway.
+        hidden = float(np.median(rests[rests < 1])) if (rests < 1).any() else 0.0
         return 1.0 - hidden if hidden > HIDDEN_SHARE and not self._still(key) else 1.0
 
     def _decide(self, model: Model) -> dict[HandlingKey, GraspingFingers]:
