@@ -275,9 +275,10 @@ static void hf_fill_changes(
     const hf_finger *f, size_t now, size_t then, hf_real load_to_noise, hf_real *out)
 {
     const holdfast_motion *const m = &f->state->motion;
-    /* The least noise is that of the first touch, if readings at rest have none: few are rounded. */
+    /* Without noise at rest, the least is that of the first touch: few readings are rounded. */
     const hf_real noise = hf_max(m->noise, m->rounding);
-    const hf_real taxel_noise = hf_max(m->taxel_noise, m->rounding), echo = taxel_noise * taxel_noise;
+    const hf_real taxel_noise = hf_max(m->taxel_noise, m->rounding);
+    const hf_real echo = taxel_noise * taxel_noise;
     const hf_real load = hf_load_floor(m->peak_load, noise);
     const hf_real taxel_load = hf_load_floor(m->peak_taxel_load, taxel_noise);
     /* v = |dF| and |dF - (dF . n) n|, over L. */
