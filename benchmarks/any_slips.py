@@ -42,8 +42,8 @@ LAG = 8
 """Samples over which the rival takes the change of the force."""
 
 
-def seed_of(hand: int) -> int:
-    return int(FROZEN[3 * hand : 3 * hand + 6], 16)
+def seed_of(hand: int, commit: str = FROZEN) -> int:
+    return int(commit[3 * hand : 3 * hand + 6], 16)
 
 
 def simulated(
@@ -57,10 +57,12 @@ def simulated(
     return [load_recording(path) for path in paths if path.exists()]
 
 
-def handling_of(folder: Path, hand: int, **options: object) -> list[Recording]:
-    names = list(load_objects(None))
+def handling_of(
+    folder: Path, hand: int, commit: str = FROZEN, **options: object
+) -> list[Recording]:
+    names, seed = list(load_objects(None)), seed_of(hand, commit)
     turn = [names[(hand + k) % len(names)] for k in range(N_HANDLING)]
-    return simulated(folder, ",".join(turn), profile="handling", seed=seed_of(hand), **options)
+    return simulated(folder, ",".join(turn), profile="handling", seed=seed, **options)
 
 
 Scores = Callable[[Recording, Model], Iterator[SlipDecisions]]
@@ -149,10 +151,15 @@ Counts = dict[tuple[str, str], SlipCounts]
 
 def counts_of_hand(hand: int, model: Model, options: argparse.Namespace) -> Counts:
     """Simulate a hand unless its recordings exist, calibrate the model, and test all parts."""
-    folder, seed, counts = options.folder / f"hand{hand}", seed_of(hand), Counts()
-    own = handling_of(folder / "handling", hand)
-    test = simulated(folder / "reference", repeats=options.repeats, profile="reference", seed=seed)
-    tests = {"reference": (own, test)}
+    folder, seed = options.folder / f"hand{hand}", seed_of(hand, options.commit)
+    counts = Counts()
+    own = (
+        [] if options.parts == ["orca"] else handling_of(folder / "handling", hand, options.commit)
+    )
+    tests = {}
+    if "reference" in options.parts:
+        reference = {"profile": "reference", "seed": seed, "repeats": options.repeats}
+        tests["reference"] = own, simulated(folder / "reference", **reference)
     if "slips" in options.parts:
         tests["slips"] = own, simulated(folder / "slips", profile="slips", seed=seed)
     if "others" in options.parts:
@@ -160,7 +167,7 @@ def counts_of_hand(hand: int, model: Model, options: argparse.Namespace) -> Coun
         tests["others"] = own, simulated(folder / "others", **other)
     if "orca" in options.parts and hand < options.orca:
         orca = {"profile": "reference", "seed": seed, "sensor": "orca-finger"}
-        handling = handling_of(folder / "orca-handling", hand, sensor="orca-finger")
+        handling = handling_of(folder / "orca-handling", hand, options.commit, sensor="orca-finger")
         tests["orca"] = handling, simulated(folder / "orca", **orca)
     for part, (handling, recordings) in tests.items():
         report = calibrate_with_report(model, handling)
@@ -217,5 +224,6 @@ if __name__ == "__main__":
     parser.add_argument("--hands", type=int, default=10)
     parser.add_argument("--orca", type=int, default=1, help="hands with the part orca")
     parser.add_argument("--repeats", type=int, default=5, help="of each object, of reference")
-    parser.add_argument("--parts", nargs="*", default=["slips", "others", "orca"])
+    parser.add_argument("--parts", nargs="*", default=["reference", "slips", "others", "orca"])
+    parser.add_argument("--commit", default=FROZEN, help="whose id has the seeds")
     main(parser.parse_args())

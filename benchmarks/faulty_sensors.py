@@ -3,6 +3,7 @@
     python benchmarks/faulty_sensors.py --out docs/img    # faulty-sensors.png
     python benchmarks/faulty_sensors.py --data DATA       # a table
     python benchmarks/faulty_sensors.py --laws FOLDER ... # laws of a living skin: two tables
+    python benchmarks/faulty_sensors.py --quiet orca-finger --models builtin:any mine.json --seed 7
 
 Before: the detector without what it knows of magnetometers (`Sensor.magnetic`). The readings of the
 picture are made: AnySkin at 100 Hz with a noise of 1 uT, pressed with 300 uT.
@@ -39,6 +40,8 @@ from holdfast.plots.style import (
 )
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
+from holdfast.twin.force_skin import ForceReadout
+from holdfast.twin.simulation import Grasp, simulate
 
 Values = npt.NDArray[np.float64]
 ANYSKIN, RATE = sensor("anyskin"), 100.0
@@ -324,13 +327,48 @@ def print_broken(recordings: Sequence[Recording], start: float) -> None:
             print(f"| `{module.sensor.name}` | {title} | {row} |")
 
 
+def quiet_recordings(name: str, seed: int) -> Iterator[tuple[Recording, npt.NDArray[np.bool_]]]:
+    """Yield ten minutes of an open hand, and of a hold without jerks in two parts; and its time."""
+    times = np.arange(600 * 100) / 100
+    readout = ForceReadout(sensor(name), np.random.default_rng(seed))
+    readings = readout.read(np.zeros((len(times), sensor(name).n_taxels, 3)), times)
+    open_hand = Recording("open", {"index": Tactile(sensor(name), times, readings)})
+    yield open_hand, np.ones(len(times), bool)
+    for item in ("can", "box"):
+        grasp = Grasp(item, 1, 1, "long-hold", seed, glitch_rate=0.0, sensor=name)
+        recording = simulate(grasp)
+        times = recording.truth.times
+        locked = recording.truth.hand["phase"] == "locked"
+        yield recording, locked & (times > times[locked][0] + 1)
+
+
+def print_quiet(name: str, models: Sequence[str], seed: int) -> None:
+    """Print alarms and faults of an open hand and of a quiet hold, all fingers together."""
+    print("| sensor | hand | model | minutes | rises to UNSTABLE | samples with a fault |")
+    for recording, quiet in quiet_recordings(name, seed):
+        for model in models:
+            n_rises = n_faulty = 0
+            for trace in detect(Model.load(model), recording).fingers.values():
+                unstable = (trace.state == UNSTABLE) & quiet
+                n_rises += int((np.diff(unstable, prepend=False) & unstable & quiet).sum())
+                n_faulty += int((trace.faults[quiet] != 0).sum())
+            minutes = np.diff(trace.times)[quiet[1:]].sum() / 60
+            row = f"{recording.name} | {model} | {minutes:.1f} | {n_rises} | {n_faulty}"
+            print(f"| `{name}` | {row} |", flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, help="folder for the picture")
     parser.add_argument("--data", type=Path, help="folder with the real recordings")
     parser.add_argument("--laws", type=Path, nargs="+", help="folders with healthy recordings")
     parser.add_argument("--start", type=float, default=8.0, help="of a fault [s]")
+    parser.add_argument("--quiet", nargs="+", default=[], help="sensors with steps, by the twin")
+    parser.add_argument("--models", nargs="+", default=["builtin:any"], help="of --quiet")
+    parser.add_argument("--seed", type=int, default=7, help="of --quiet")
     options = parser.parse_args()
+    for name in options.quiet:
+        print_quiet(name, options.models, options.seed)
     if options.laws:
         print_healthy(options.laws)
         firsts = (next(recordings_of(folder)) for folder in options.laws)

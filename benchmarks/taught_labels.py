@@ -97,7 +97,7 @@ def film(recording, path, films):
     path.with_suffix(".times").write_text(lines)
 
 
-def guided(seed, folder, films):
+def guided(seed, folder, films, sensor):
     """Perform the grasps of the protocol, one that fails twice at most, and label them."""
     objects, number = list(load_objects(None)), 1
     for step in STEPS:
@@ -107,7 +107,8 @@ def guided(seed, folder, films):
                 continue
             for _ in range(2):
                 path = folder / f"{step.name}-{k + 1}.mcap"
-                grasp = Grasp(objects[number % len(objects)], 1, number, seed=seed)
+                item = objects[number % len(objects)]
+                grasp = Grasp(item, 1, number, seed=seed, sensor=sensor)
                 made = perform(grasp, step.name, step.n_actions, step.seconds + EXTRA_SECONDS)
                 made = replace(made, name=path.stem)
                 path.with_suffix(".labels.json").unlink(missing_ok=True)
@@ -121,7 +122,7 @@ def guided(seed, folder, films):
             print(seed, path.stem, len(slides or ()), "slides", note, flush=True)
 
 
-def next_grasps(seed, folder):
+def next_grasps(seed, folder, sensor):
     objects = list(load_objects(None))
     plan = [("reference", x) for x in objects]
     plan += [("slips", x) for x in objects[::3]] + [("coupled", x) for x in objects[1::3]]
@@ -129,7 +130,7 @@ def next_grasps(seed, folder):
         path = folder / f"{PROFILES[profile]}_{name}.mcap"
         if path.exists():
             continue
-        grasp = Grasp(name, 2, 1, profile, seed)
+        grasp = Grasp(name, 2, 1, profile, seed, sensor=sensor)
         made = simulate(grasp)
         if made.metadata["case"] == "failed":
             made = simulate(replace(grasp, attempt=1))
@@ -200,11 +201,13 @@ def result(recordings, fresh):
     }  # fmt: skip
 
 
-def run(out, seed, kinds, films):
+def run(out, seed, kinds, films, sensor):
     """Yield the results of a seed that are not there."""
     folders = [out / str(seed) / name for name in ("guided", "next")]
     for folder, make in zip(
-        folders, (lambda f: guided(seed, f, films), lambda f: next_grasps(seed, f)), strict=True
+        folders,
+        (lambda f: guided(seed, f, films, sensor), lambda f: next_grasps(seed, f, sensor)),
+        strict=True,
     ):
         if not (folder / "complete").exists():
             folder.mkdir(parents=True, exist_ok=True)
@@ -282,14 +285,14 @@ def main():
     parser.add_argument("seeds", type=int, nargs="*")
     parser.add_argument("--labels", nargs="*", default=["camera"], help="none: grasps alone")
     parser.add_argument("--films", action="store_true")
+    parser.add_argument("--sensor", default="uskin-curved", help="of every fingertip")
     options = parser.parse_args()
     results = options.out / "results.jsonl"
     rows = [json.loads(x) for x in results.read_text().splitlines()] if results.exists() else []
     for seed in options.seeds:
         done = {row["labels"] for row in rows if row["seed"] == seed}
-        for row in run(
-            options.out, seed, [x for x in options.labels if x not in done], options.films
-        ):
+        kinds = [x for x in options.labels if x not in done]
+        for row in run(options.out, seed, kinds, options.films, options.sensor):
             rows.append(row)
             with results.open("a") as file:
                 file.write(json.dumps(row) + "\n")

@@ -76,7 +76,10 @@ def naive(readings, given, rate=RATE):
             now = found if math.isinf(least[0]) else least
         elif math.isinf(least[0]):
             now = floor, floor
-        noise, taxel_noise = now
+        # Of a sensor that rests at zero, each other reading is rounded.
+        n_rounded = np.count_nonzero(readings[k]) if given.rests_at_zero else 0
+        rounding = (given.step or 0.0) * COUNT_NOISE * math.sqrt(n_rounded)
+        noise, taxel_noise = (max(x, rounding) for x in now)
         if k < 1:
             continue
         whole, of_taxels = peak + 100 * noise, peak_taxels + 100 * taxel_noise
@@ -118,10 +121,12 @@ def walk(given, n=150, seed=0, scale=300.0):
     pressed = load * (1 + rng.random((given.n_taxels, 3))) + load * moving + noise
     if given.unit == "count":
         return np.rint(32000 + scale * pressed).astype(np.uint16)
-    return pressed
+    return pressed if given.step is None else given.step * np.rint(pressed / given.step)
 
 
-@pytest.mark.parametrize("name", ["uskin-4x4", "uskin-curved", "anyskin", "papillarray"])
+@pytest.mark.parametrize(
+    "name", ["uskin-4x4", "uskin-curved", "anyskin", "papillarray", "orca-thumb"]
+)
 @pytest.mark.parametrize("rate", [30.0, 100.0, 500.0])
 def test_equal_the_definitions(name, rate):
     given = sensor(name)

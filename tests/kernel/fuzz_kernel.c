@@ -73,7 +73,6 @@ static void make_finger(input *in, holdfast_finger *finger, size_t n_lags)
     finger->max_offset = in_counts ? 50000 * finger->n_used : HF_INFINITY;
     finger->min_noise = in_counts ? 1 : (hf_real)1e-6;
     finger->step = in_counts ? 1 : HF_NAN;
-    finger->rounding_noise = in_counts ? (hf_real)0.3 : HF_NAN;
     finger->step_noise = in_counts ? (hf_real)0.3 : (hf_real)1e-6;
     const hf_real fields[4] = {0, 130, HF_INFINITY, 0};
     finger->max_field = fields[take(in, 1) % 4];

@@ -20,8 +20,8 @@
 
 static const holdfast_finger hf_fingers[2] = {
 
-{0, 5, 0, (hf_real)4.0, (hf_real)0.0, (hf_real)65535.0, (hf_real)655.35, (hf_real)64879.65, (hf_real)198265.70908634702, (hf_real)0.5773502691896258, (hf_real)0.0, (hf_real)0.2886751345948129, (hf_real)1.0, (hf_real)0.2886751345948129, (hf_real)0.10001, {(hf_real)0.0, (hf_real)0.6, (hf_real)0.8}, 6, 14, false, false, false},
-{5, 4, 8, (hf_real)4.0, (hf_real)0.0, (hf_real)65535.0, (hf_real)655.35, (hf_real)64879.65, (hf_real)198265.70908634702, (hf_real)0.5773502691896258, (hf_real)0.0, (hf_real)0.2886751345948129, (hf_real)1.0, (hf_real)0.2886751345948129, (hf_real)0.10001, {(hf_real)1.0, (hf_real)0.0, (hf_real)0.0}, 6, 14, false, false, false}};
+{0, 5, 0, (hf_real)4.0, (hf_real)0.0, (hf_real)65535.0, (hf_real)655.35, (hf_real)64879.65, (hf_real)198265.70908634702, (hf_real)0.5773502691896258, (hf_real)0.0, (hf_real)1.0, (hf_real)0.2886751345948129, (hf_real)0.10001, {(hf_real)0.0, (hf_real)0.6, (hf_real)0.8}, 6, 14, false, false, false},
+{5, 4, 8, (hf_real)4.0, (hf_real)0.0, (hf_real)65535.0, (hf_real)655.35, (hf_real)64879.65, (hf_real)198265.70908634702, (hf_real)0.5773502691896258, (hf_real)0.0, (hf_real)1.0, (hf_real)0.2886751345948129, (hf_real)0.10001, {(hf_real)1.0, (hf_real)0.0, (hf_real)0.0}, 6, 14, false, false, false}};
 static const holdfast_feature hf_features[98] = {
 {0, 1, true, 0, 0, 0, (hf_real)20.0}, {1, 0, false, 0, 0, 1, (hf_real)0.0}, {4, 0, false, 6, 0, 2, (hf_real)0.0},
 {5, 2, false, 14, 0, 3, (hf_real)0.0}, {6, 1, false, 4, 0, 4, (hf_real)3.0}, {7, 0, true, 10, 0, 5, (hf_real)0.0},

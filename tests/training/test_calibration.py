@@ -18,7 +18,13 @@ from holdfast.training.calibration import (
     activity,
     n_changed,
 )
-from holdfast.training.own_handling import MIN_SCALE, grasped_samples
+from holdfast.training.own_handling import (
+    MIN_SCALE,
+    HandlingKey,
+    OwnHandling,
+    grasped_samples,
+    location_and_scale,
+)
 from holdfast.training.thresholds import tune
 from training.build import (
     PAD,
@@ -171,6 +177,33 @@ def test_it_warns_of_little_and_of_still_handling(model):
     assert len(report.warnings) == 2
 
 
+def test_handling_that_the_steps_of_a_sensor_hide(model):
+    """It shrinks no scale, and bounds the false alarms of slips by what shows of it alone."""
+    steps = dataclasses.replace(
+        PAD, name="steps", range=(-40.0, 40.0), step=1.0, rests_at_zero=True
+    )
+    own, stepped = OwnHandling(model), []
+    for recording in DATA:
+        modules = {
+            name: Tactile(steps, module.times, np.rint(module.readings))
+            for name, module in recording.modules.items()
+        }
+        stepped.append(Recording(recording.name, modules))
+        own.add(stepped[-1])
+    features = own.features(HandlingKey("*", "steps"))
+    hidden = np.median((features == features.min(axis=0)).mean(axis=0))
+    assert hidden > 0.5
+    report = calibrate_with_report(model, stepped)
+    scale = handling_of(report.model, "steps").scale
+    seen, default = location_and_scale(features)[1], model.fingers["*"].default_handling[1]
+    assert (seen < default).sum() > 10
+    np.testing.assert_array_equal(scale, np.maximum(seen, default))
+    (summary,), (whole,) = report.sensors, calibrate_with_report(model, DATA).sensors
+    shown = summary.slips[0].minutes / whole.slips[0].minutes
+    assert shown == pytest.approx(1 - hidden, rel=0.05)
+    assert any("push harder" in warning for warning in report.warnings)
+
+
 def test_false_alarms_are_those_of_slips(model, calibrated):
     report = calibrate_with_report(model, DATA, false_alarms=8.0)
     (summary,), (usual,) = report.sensors, calibrated.sensors
@@ -303,22 +336,27 @@ FIGURES = HandlingFigures(0.4, 95.0, 2.0, 0.1, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("change", "worse"),
+    ("stable_before", "change", "worse"),
     [
-        ({}, False),
-        ({"stable": 94.6}, False),
-        ({"stable": 94.4}, True),
-        ({"raised": 1.4}, False),
-        ({"raised": 1.6}, True),
-        ({"alarms_per_minute": 3.0}, True),
-        ({"alarms_per_minute": 3.0, "stable": 97.0}, False),
-        ({"raised": None, "slip_threshold": None}, False),
+        (95.0, {}, False),
+        (95.0, {"stable": 94.6}, False),
+        (95.0, {"stable": 94.4}, True),
+        (95.0, {"raised": 1.4}, False),
+        (95.0, {"raised": 1.6}, True),
+        (95.0, {"alarms_per_minute": 3.0}, True),
+        (95.0, {"alarms_per_minute": 3.0, "stable": 97.0}, False),
+        (95.0, {"raised": None, "slip_threshold": None}, False),
+        # More is STABLE than the threshold is chosen for: 95 %.
+        (99.0, {"alarms_per_minute": 40.0}, False),
+        (99.0, {"alarms_per_minute": 40.0, "stable": 94.4}, True),
+        (99.0, {"raised": 1.6}, True),
     ],
 )
-def test_figures_that_are_worse(calibrated, change, worse):
+def test_figures_that_are_worse(calibrated, stable_before, change, worse):
+    before = msgspec.structs.replace(FIGURES, stable=stable_before)
     after = msgspec.structs.replace(FIGURES, **change)
-    assert after.worse_than(FIGURES) is worse
-    summary = msgspec.structs.replace(calibrated.sensors[0], before=FIGURES, after=after)
+    assert after.worse_than(before) is worse
+    summary = msgspec.structs.replace(calibrated.sensors[0], before=before, after=after)
     report = dataclasses.replace(calibrated, sensors=(summary,))
     if not worse:
         report.check()

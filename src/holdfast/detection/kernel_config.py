@@ -172,7 +172,6 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
         "high_end": high - end,
         "max_offset": OFFSET_SHARE * (high - low) * n_used * SUM_OF_WEIGHTS,
         "min_noise": float(noise * np.sqrt(n_used)),
-        "rounding_noise": noise if sensor.unit == "count" else np.nan,
         "step": sensor.step or (1.0 if sensor.unit == "count" else np.nan),
         "step_noise": noise if sensor.step is None else sensor.step * COUNT_NOISE,
         "is_magnetic": bool(sensor.magnetic),

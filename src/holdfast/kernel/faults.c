@@ -426,10 +426,8 @@ static void hf_find_noisy_taxel(const hf_finger *f, hf_real largest)
 {
     holdfast_finger_memory *const s = f->state;
     /* Noise of a reading: noise of F / sqrt(n_used), where the step is not known. */
-    hf_real quiet = f->finger->rounding_noise;
-    if (isnan(quiet)) {
-        quiet = s->noise / hf_sqrt(f->finger->n_used);
-    }
+    const hf_real quiet = isnan(f->finger->step) ? s->noise / hf_sqrt(f->finger->n_used)
+                                                 : f->finger->step_noise;
     size_t loudest = 0;
     while (loudest + 1 < f->n_taxels && f->powers[f->n + loudest] != largest) {
         ++loudest;

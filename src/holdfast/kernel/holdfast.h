@@ -293,9 +293,8 @@ typedef struct {
     hf_real min_noise;      /* least noise of a component of the force: by the step of readings */
     hf_real max_field;      /* largest common field, see field.c; 0 where none is found, inf where
                                the unit of the readings is not known */
-    hf_real rounding_noise; /* noise of a reading by its step; NaN where the step is not known */
     hf_real step;           /* smallest change of a reading; NaN where it is not known */
-    hf_real step_noise;     /* least noise of a reading in features of sliding */
+    hf_real step_noise;     /* noise of a reading by its step, or the least in newtons */
     hf_real max_step;       /* a longer step in time is a gap of the finger [s] */
     hf_real normal[3];      /* of the patch, in the fingertip frame; of length 1 */
     size_t sigma_window;    /* N_w of the m and the sigma that are reported [samples] */

@@ -93,6 +93,7 @@ typedef struct {
     hf_real peak_taxel_load; /* the largest so far, slowly forgotten */
     hf_real noise;           /* of F_tip, standard deviation of the norm */
     hf_real taxel_noise;     /* of all taxels, standard deviation of the norm */
+    hf_real rounding;        /* of both by the rounding of this sample; 0 unless it rests at zero */
     hf_real least_noise;     /* of the blocks that are complete; infinite before */
     hf_real least_taxel_noise;
     hf_real block_squares; /* of the steps of F_tip in the block that is not complete */

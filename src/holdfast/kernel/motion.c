@@ -120,10 +120,22 @@ HF_SHARED hf_real hf_append_taxels(const hf_finger *f, double time, hf_real forc
     return sums.normal;
 }
 
+/* Return the noise of F_tip, and of all taxels, by the rounding of the readings: step / sqrt(12) of
+ * each. Where a reading without contact is exactly 0, only the others are rounded. */
+static hf_real hf_rounding(const hf_finger *f)
+{
+    int64_t n_rounded = 0;
+    for (size_t i = 0; i < 3 * f->n; ++i) {
+        n_rounded += f->readings[i] != 0;
+    }
+    return f->finger->step_noise * hf_sqrt((hf_real)n_rounded);
+}
+
 /* Update the noise: the least mean square step over blocks, halved, and its root. */
 static void hf_update_noise(const hf_finger *f, double time)
 {
     holdfast_motion *const m = &f->state->motion;
+    m->rounding = f->finger->rests_at_zero ? hf_rounding(f) : 0;
     if (isnan(m->block_start)) {
         m->block_start = time;
     }
@@ -244,10 +256,10 @@ static void hf_update_movement(const hf_finger *f, size_t now, size_t n_before, 
     }
 }
 
-/* Return what changes of the force of a finger are divided by. */
-static hf_real hf_load_floor(const holdfast_motion *m)
+/* Return what a change is divided by. */
+static hf_real hf_load_floor(hf_real peak, hf_real noise)
 {
-    return m->peak_load + HF_NOISE_WEIGHT * m->noise; /* L = peak + 100 noise */
+    return peak + HF_NOISE_WEIGHT * noise; /* L = peak + 100 noise */
 }
 
 /* Return log(v / load) of a change v, given v^2 with noise; at least log(LEAST_CHANGE). */
@@ -263,9 +275,12 @@ static void hf_fill_changes(
     const hf_finger *f, size_t now, size_t then, hf_real load_to_noise, hf_real *out)
 {
     const holdfast_motion *const m = &f->state->motion;
-    const hf_real noise = m->noise, echo = m->taxel_noise * m->taxel_noise;
-    const hf_real load = hf_load_floor(m);
-    const hf_real taxel_load = m->peak_taxel_load + HF_NOISE_WEIGHT * m->taxel_noise;
+    /* Without noise at rest, the least is that of the first touch: few readings are rounded. */
+    const hf_real noise = hf_max(m->noise, m->rounding);
+    const hf_real taxel_noise = hf_max(m->taxel_noise, m->rounding);
+    const hf_real echo = taxel_noise * taxel_noise;
+    const hf_real load = hf_load_floor(m->peak_load, noise);
+    const hf_real taxel_load = hf_load_floor(m->peak_taxel_load, taxel_noise);
     /* v = |dF| and |dF - (dF . n) n|, over L. */
     hf_real change[3], mean[3], shift[3];
     hf_force_between(f, then, now, change);
@@ -343,7 +358,9 @@ HF_SHARED void hf_update_motion(const hf_finger *f, double time)
     }
     /* log(L / noise): the same for all lags. */
     const holdfast_motion *const m = &f->state->motion;
-    const hf_real load_to_noise = hand->has_centres ? hf_log(hf_load_floor(m) / m->noise) : HF_NAN;
+    const hf_real noise = hf_max(m->noise, m->rounding);
+    const hf_real load_to_noise =
+        hand->has_centres ? hf_log(hf_load_floor(m->peak_load, noise) / noise) : HF_NAN;
     for (size_t i = 0; i < HF_N_LAGS(hand); ++i) {
         const holdfast_lag *const lag = &hand->lags[i];
         hf_real *const out = f->relative + i * HOLDFAST_N_RELATIVE;

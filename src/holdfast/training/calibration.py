@@ -23,6 +23,7 @@ from holdfast.training.own_handling import (
     location_and_scale,
 )
 from holdfast.training.thresholds import (
+    STABLE_SHARE,
     GraspingFinger,
     GraspingFingers,
     HandlingSlips,
@@ -40,6 +41,9 @@ STILL_CHANGE = 0.03
 MOVED_LOCATION, MOVED_SCALE = 0.5, 1.5
 """A feature changes if its location moves by this share of its scale, or its scale by this
 factor."""
+HIDDEN_SHARE = 0.5
+"""Share of the handling in which a feature is at its least value, median over the features, above
+which most of the handling does not show in the readings."""
 MAX_ACTIVITY = 2.0
 """Own handling is refused as slip above this `activity`. None of 450 grasps of randomized hands has
 more in the held samples in which it does not slide; over half have more while they slide."""
@@ -100,13 +104,15 @@ class HandlingFigures(msgspec.Struct, frozen=True):
     def worse_than(self, other: "HandlingFigures") -> bool:
         """Return whether STABLE is rarer, slip is reported more, or alarms are more frequent.
 
-        An alarm begins and ends with STABLE, so more of them are no worse where more samples are
-        STABLE: a finger that is never STABLE has no alarm.
+        STABLE may fall to the share for which the threshold is chosen. An alarm begins and ends
+        with STABLE, so more of them are no worse where more samples are STABLE, or where STABLE
+        falls so: a finger that is never STABLE has no alarm.
         """
-        stable = self.stable - other.stable
+        aim = min(other.stable, 100 * STABLE_SHARE)
         raised = (self.raised or 0.0) - (other.raised or 0.0)
         more_alarms = self.alarms_per_minute > other.alarms_per_minute
-        return stable < -WORSE or raised > WORSE or (stable <= 0 and more_alarms)
+        alarms = more_alarms and self.stable <= other.stable == aim
+        return self.stable < aim - WORSE or raised > WORSE or alarms
 
 
 class HandlingSummary(msgspec.Struct, frozen=True):
@@ -356,6 +362,7 @@ class _Calibration:
     def __init__(self, handling: OwnHandling, recordings: Sequence[Recording]) -> None:
         self.model, self.seen, self.recordings = handling.model, handling, recordings
         self.keys = [key for key in handling.samples if handling.seconds(key) >= MIN_HANDLING]
+        self.shown = {key: self._shown(key) for key in self.keys}
 
     def result(self, false_alarms: float) -> CalibratedModel:
         """Return the calibrated model, with what the calibration saw.
@@ -371,7 +378,7 @@ class _Calibration:
         for key, normalisation in handling.items():
             part = self.model.finger(key.finger).with_handling(normalisation)
             moves = not self.seen.load_change(key) < STILL_CHANGE
-            slips[key] = choose_handling_slips(after[key], part, false_alarms)
+            slips[key] = choose_handling_slips(after[key], part, false_alarms, self.shown[key])
             chosen: dict[HeadName, float] = {one.head: one.threshold for one in slips[key]}
             chosen["stable"] = choose_stability_threshold(after[key], part, moves=moves)
             handling[key] = msgspec.structs.replace(normalisation, thresholds=chosen)
@@ -423,6 +430,8 @@ class _Calibration:
             # of the default.
             location = np.maximum(location, part.default_handling[0])
             scale = _stretch(part, scale) * scale
+        elif self.shown[key] < 1:  # nor does handling below the steps of a sensor
+            scale = np.maximum(scale, part.default_handling[1])
         return Handling(
             location=tuple(location.tolist()),
             scale=tuple(scale.tolist()),
@@ -435,6 +444,17 @@ class _Calibration:
         _, scale = location_and_scale(self.seen.features(key))
         moves = self.seen.load_change(key) >= STILL_CHANGE  # not where it is unknown
         return not moves and _stretch(self.model.finger(key.finger), scale) > 1
+
+    def _shown(self, key: HandlingKey) -> float:
+        """Return the share of the handling that shows over the steps of a sensor, if most does not.
+
+        What is not felt says nothing about false alarms. Still handling has a rule of its own.
+        """
+        features = self.seen.features(key)
+        rests = (features == features.min(axis=0)).mean(axis=0)
+        # One taxel has no residual: a feature that it never changes shows nothing anyway.
+        hidden = float(np.median(rests[rests < 1])) if (rests < 1).any() else 0.0
+        return 1.0 - hidden if hidden > HIDDEN_SHARE and not self._still(key) else 1.0
 
     def _decide(self, model: Model) -> dict[HandlingKey, GraspingFingers]:
         """Return the decisions of a model about the own handling, for any threshold."""
@@ -453,6 +473,12 @@ class _Calibration:
         return {key: GraspingFingers(grasped) for key, grasped in fingers.items()}
 
     def _warnings(self, sensors: Sequence[HandlingSummary]) -> Iterator[str]:
+        for key, shown in self.shown.items():
+            if shown < 1:
+                yield (
+                    f"{key}: {100 * shown:.0f} % of this handling changes the readings by more "
+                    "than noise and steps, and only that counts for slips; push harder"
+                )
         for summary in sensors:
             if summary.seconds < ENOUGH_HANDLING:
                 yield (

@@ -697,7 +697,7 @@ class HandlingSlips(msgspec.Struct, frozen=True):
         head: `slip`, or `slip_changes` of recordings that begin in contact.
         threshold: of the probability; 1 if the head stays silent.
         n: number of false alarms at the threshold.
-        minutes: held time of all fingers [min].
+        minutes: held time of all fingers that counts [min].
         at_most: upper end of the rate of false alarms per minute, with 95 %.
         more_minutes: held time of all fingers [min] after which that would be lower.
         then_at_most: it would be this at the same rate.
@@ -738,7 +738,7 @@ class HandlingSlips(msgspec.Struct, frozen=True):
 
 
 def choose_handling_slips(
-    handling: GraspingFingers, part: FingerModel, false_alarms: float
+    handling: GraspingFingers, part: FingerModel, false_alarms: float, shown: float = 1.0
 ) -> list[HandlingSlips]:
     """Choose the thresholds of slips on own handling in which nothing slips.
 
@@ -749,6 +749,7 @@ def choose_handling_slips(
         handling: decided by the model.
         part: model of the fingers.
         false_alarms: maximum number per minute of held time of a finger.
+        shown: share of the held time that counts, as the readings show it.
     """
     chosen: list[HandlingSlips] = []
     for name in ("slip", "slip_changes"):
@@ -762,14 +763,14 @@ def choose_handling_slips(
         if head is None or not decided:
             continue
         curve = SlipCounts.total([slip_curve(slips) for _, slips in decided])
-        index = choose_threshold(curve, false_alarms)
+        index = choose_threshold(curve, shown * false_alarms)
         threshold = 1.0 if index is None else float(SLIP_THRESHOLDS[index])
         found = head.share_found(threshold)
         if found is not None and found < MIN_FOUND:
             index = None
         n = int(curve.false_held[-1 if index is None else index])
-        minutes = curve.held_seconds / 60
-        then = minutes + MORE_MINUTES
+        minutes = shown * curve.held_seconds / 60
+        then = minutes + shown * MORE_MINUTES
         chosen.append(
             HandlingSlips(
                 head=head.name,

@@ -418,6 +418,12 @@ class TestNoisy:
         values[gate, 3] = 0.0
         assert told_faults(values, sensor(6, "tip", limits=None)) == [(((), ()), 900)]
 
+    def test_a_force_at_the_border_of_two_steps_is_no_noise(self):
+        steps = replace(sensor(6, "steps", limits=None, unit="N"), step=0.1, rests_at_zero=True)
+        values = np.zeros((900, 6, 3))
+        values[300:, 3, 2] = 0.1 * np.random.default_rng(4).integers(3, 5, 600)
+        assert told_faults(values, steps) == [(((), ()), 900)]
+
     def test_three_taxels_are_too_few(self):
         which = sensor(3, limits=(0.0, 65_535.0))
         assert told_faults(self.noisy(2000.0, which, (1,)), which) == [(((), ()), 900)]
