@@ -193,9 +193,9 @@ MESSAGES = [
     ("sensors --template 3x3 --pitch 0", "--pitch", "0"),
     ("sensors --template 3x3 --unit kg", "--unit", "'kg'", "N"),
     ("sensors gtac --template 3x3", "--template", "'gtac'"),
-    ("doctor --history x.json", "--history", "SOURCE"),
+    ("doctor --plot x.svg", "--plot", "SOURCE"),
     ("doctor serial:///dev/null?sensor=part.json", "part.json", "'positions'"),
-    ("doctor touched.parquet --history x.json", "index is touched from the start"),
+    ("doctor touched.parquet", "index is touched from the start"),
 ]
 """Words of a command, and what its message must name: what was wrong, or what to type instead."""
 

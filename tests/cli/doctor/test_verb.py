@@ -92,8 +92,8 @@ def test_missing_extras_are_reported(monkeypatch):
 
 
 def test_the_modules_of_a_source(capsys, tmp_path):
-    history, plot = tmp_path / "history.json", tmp_path / "x.svg"
-    call = ["doctor", saved(tmp_path, sensor("uskin-4x4")), "--history", str(history)]
+    plot = tmp_path / "x.svg"
+    call = ["doctor", saved(tmp_path, sensor("uskin-4x4"))]
     assert main([*call, "--plot", str(plot)]) == 0
     out, err = capsys.readouterr()
     assert "\nindex " in out
@@ -101,14 +101,12 @@ def test_the_modules_of_a_source(capsys, tmp_path):
     assert main([*call, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (list(found["modules"]), found["findings"]) == (["index"], [])
-    assert found["last"] == found["date"] and found["history"] == str(history)
 
 
 def test_a_module_of_one_taxel_is_said(capsys, tmp_path):
     flat = sensor("anyskin")
     one = Sensor("one", flat.positions[:1], flat.rotations[:1], flat.normal, 100.0, magnetic=True)
-    history = str(tmp_path / "history.json")
-    assert main(["doctor", saved(tmp_path, one), "--history", history]) == 0
+    assert main(["doctor", saved(tmp_path, one)]) == 0
     assert "index has one taxel" in capsys.readouterr().out.splitlines()[-1]
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from holdfast.contact import MERGE_GAP, MIN_HOLDING_FINGERS, ContactState, HandEstimate
 from holdfast.errors import SourceError
-from holdfast.live.health import HealthCheck, ModuleHealth, changes_since, module_health
+from holdfast.live.health import HealthCheck, ModuleHealth, findings_of, module_health
 from holdfast.live.stream_detector import TOUCHING, StreamUpdate
 from holdfast.live.teaching.steps import STEPS, Check, Step
 from holdfast.sensors import Sensor
@@ -413,6 +413,6 @@ class GuidedProtocol:
         }
         n = len(modules)
         text = f"is this your hand: {n} module{'s' * (n > 1)}, {', '.join(kinds)}?"
-        findings = changes_since(HealthCheck("", 0, modules), None)
+        findings = findings_of(HealthCheck("", 0, modules))
         # Dead taxels are left out by every model: they are named, and the protocol goes on.
         return True, " ".join([text, "; ".join(findings)]).rstrip()
