@@ -57,7 +57,7 @@ class GraspOptions:
         str,
         typer.Option(
             help="Troubles of magnetic skins, as field=300,turn-time=3,zero-share=0.02,drift=20000,"
-            "cross-talk=0.1,invented-months=4 (counts, s, shares, counts an hour, months)."
+            "invented-months=4 (counts, s, shares, counts an hour, months)."
         ),
         RARE,
     ] = ""

@@ -51,7 +51,6 @@ FindingKind = Literal[
     "clock_drift",
     "no_labels",
     "copy",
-    "cross_talk",
     "held",
     "invalid",
     "stuck",
@@ -93,10 +92,11 @@ def findings_of_scan(scan: FindingsScan) -> list[Finding]:
         if module.force.n_samples > 1
         for kind, text in _of_module(module)
     ]
-    found += [
-        Finding(each.module, "copy" if each.share == 1 else "cross_talk", each.text)
-        for each in scan.alike
-    ]
+    forces = {n: m.force.readings for n, m in scan.modules.items() if not m.still.all()}
+    for (first, one), (second, other) in combinations(forces.items(), 2):
+        if np.array_equal(one, other):
+            text = f"has the same readings as {first}: one sensor is read twice, or written to "
+            found.append(Finding(second, "copy", text + "both; check the channels"))
     if reason := evidence_of_contact(scan.recording):
         text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
         text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
@@ -218,8 +218,8 @@ DRIFT_KEY = "clock_drift"
 _ORDER: tuple[FindingKind, ...] = (
     "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "sentinel", "zeros", "unsigned",
     "wraps", "gravity", "angle", "norm", "turned", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel",
-    "many_taxels", "no_contact", "no_labels",
+    "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel", "many_taxels",
+    "no_contact", "no_labels",
 )  # fmt: skip
 
 

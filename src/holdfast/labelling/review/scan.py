@@ -9,7 +9,7 @@ from holdfast.detection.plan import first_finite
 from holdfast.io.importers.layout_findings import LayoutFinding, layout_findings
 from holdfast.kernel.batch import fill_fingertip_force
 from holdfast.labelling.server.fingertip_forces import force_sensor
-from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
+from holdfast.live.readings_monitor import CHECK_INTERVAL, HoldDrift
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import HELD_ROWS, held_rows
 from holdfast.sensors.types import Array, Flags
@@ -118,14 +118,11 @@ class FindingsScan:
     Attributes:
         modules: by name.
         n_truth: number of samples of the truth.
-        alike: modules with the same readings, or with cross-talk.
     """
 
     def __init__(self) -> None:
         self.modules: dict[str, ModuleScan] = {}
         self.n_truth = 0
-        self.alike: list[Likeness] = []
-        self._comparison = ModuleComparison()
         self._markers: list[tuple[float, str]] = []
         self._last: Recording | None = None
 
@@ -136,7 +133,6 @@ class FindingsScan:
                 self.modules[name] = ModuleScan(module)
             self.modules[name].add(module)
         self.n_truth += 0 if part.truth is None else len(part.truth.times)
-        self.alike += self._comparison.update_recording(part)
         self._markers += part.markers
         self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
 
