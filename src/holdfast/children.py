@@ -7,7 +7,6 @@ recordings would run in every child process that imports bisect.
 import os
 import sys
 from threading import Lock
-from types import TracebackType
 
 SAFE_PATH_VARIABLE = "PYTHONSAFEPATH"
 """Environment variable that keeps the working folder from the path of Python, as `python -P`."""
@@ -80,12 +79,7 @@ class _SafePath:
                 os.environ[SAFE_PATH_VARIABLE] = "1"
             self._n_entered += 1
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._lock:
             self._n_entered -= 1
             if self._n_entered:

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import timedelta
 from threading import Lock, Timer
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from holdfast.cli.terminal.console import print_message, visible
@@ -186,12 +185,7 @@ class LiveDisplay:
             self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._live:
             self._live.stop()
 
