@@ -64,6 +64,10 @@ REMOVED: dict[str, dict[str, str]] = {
         "hold --min-scale": "none; a law never goes below 0.8 of the first force",
         "study --benchmark": NONE,
         "doctor --history": NONE,
+        "record --fingers-only": NONE,
+        "record --note": "holdfast record SOURCE OUT --set note=TEXT",
+        "detect --raw": NONE,
+        "serve --raw": NONE,
         "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {

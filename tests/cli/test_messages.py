@@ -41,7 +41,6 @@ MESSAGES = [
     ("detect builtin:any a.parquet --ignore 7", "--ignore", "FINGER:TAXEL", "'7'"),
     ("detect builtin:any a.parquet --ignore index:3,index:31", "index: taxel 31", "1 to 30"),
     ("detect builtin:any a.parquet --debounce=-1", "duration", "-1"),
-    ("detect builtin:any a.parquet --raw --debounce 0", "--raw", "leave out --debounce"),
     ("detect builtin:any a.parquet --seconds 2", "--seconds", "a.parquet"),
     ("detect builtin:any twin: --seconds 0", "--seconds", "0 given"),
     ("detect builtin:any press.csv --sensor skin", "'skin'", "anyskin"),

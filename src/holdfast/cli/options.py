@@ -225,28 +225,21 @@ class DetectorOptions:
         RARE,
     ] = None
     hysteresis: HysteresisOption = None
-    raw: Annotated[
-        bool,
-        typer.Option(
-            "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
-        ),
-        RARE,
-    ] = False
     ignore: IgnoreOption = ""
 
     def load_model(self, name: str) -> "Model":
-        """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
+        """Load a model, and apply `--debounce` and `--hysteresis`.
 
         Args:
             name: path of the model, or the name of a built-in one.
 
         Raises:
-            ValueError: a source is given instead of a model; or `--raw` and another value.
+            ValueError: a source is given instead of a model.
             ModelError: the model cannot be read.
         """
         from msgspec.structs import replace
 
-        from holdfast.detection import Debounce, Model
+        from holdfast.detection import Model
         from holdfast.devices.uri import is_uri
 
         # Before the model is read, whose message would name a missing file. builtin:any has the
@@ -256,20 +249,10 @@ class DetectorOptions:
             raise ValueError(
                 f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}"
             )
-        if self.raw and (self.debounce, self.hysteresis) != (None, None):
-            raise ValueError(
-                "--raw decides without debouncing; leave out --debounce and --hysteresis"
-            )
         model = Model.load(name)
-        # The defaults of `Debounce` are no debouncing.
-        trained = Debounce() if self.raw else model.debounce
-        debounce = Debounce(
-            trained.min_duration if self.debounce is None else self.debounce,
-            trained.hysteresis if self.hysteresis is None else self.hysteresis,
-            trained.hold,
-            trained.switching,
-        )
-        return replace(model, name=model.name or name, debounce=debounce)
+        chosen = {"min_duration": self.debounce, "hysteresis": self.hysteresis}
+        given = {key: value for key, value in chosen.items() if value is not None}
+        return replace(model, name=model.name or name, debounce=replace(model.debounce, **given))
 
     def create_stream(
         self, model: "Model", source: "Source", start: StartOptions
