@@ -8,10 +8,10 @@ import numpy as np
 from holdfast.detection.plan import first_finite
 from holdfast.io.importers.layout_findings import LayoutFinding, layout_findings
 from holdfast.kernel.batch import fill_fingertip_force
-from holdfast.labelling.server.fingertip_forces import force_sensor
 from holdfast.live.readings_monitor import CHECK_INTERVAL, HoldDrift
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import HELD_ROWS, held_rows
+from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
 LAYOUT_SAMPLES = 20_000
@@ -100,7 +100,12 @@ class ModuleScan:
         A tare is linear: it gives the same force as of all taxels.
         """
         forces = np.concatenate(self._forces)[:, None]
-        return Tactile(force_sensor(self.sensor), np.concatenate(self._times), forces)
+        skin = self.sensor
+        tip = Sensor(
+            f"force of {skin.name}", np.zeros((1, 3)), np.eye(3)[None], skin.normal, skin.rate,
+            skin.unit,
+        )  # fmt: skip
+        return Tactile(tip, np.concatenate(self._times), forces)
 
     @cached_property
     def drift(self) -> HoldDrift:
