@@ -65,6 +65,7 @@ REMOVED: dict[str, dict[str, str]] = {
         "study --benchmark": NONE,
         "doctor --history": NONE,
         "record --fingers-only": NONE,
+        "simulate --film": "holdfast simulate OUT --video films the stickers",
         "record --note": "holdfast record SOURCE OUT --set note=TEXT",
         "detect --raw": NONE,
         "serve --raw": NONE,

@@ -167,7 +167,6 @@ MESSAGES = [
     ("simulate new --cases 3", "--cases", "'3'"),
     ("simulate new --repeats 0", "repeats", "0 given"),
     ("simulate new --seed=-1", "seed", "-1 given"),
-    ("simulate new --film film.avi", "film.avi"),
     ("simulate new --faults field=3,rust=1", "--faults", "'rust=1'", "zero-share"),
     ("simulate new --faults drift", "--faults drift", "a number"),
     ("simulate new --faults drift=-1", "drift", "-1"),

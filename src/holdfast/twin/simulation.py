@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -143,9 +143,6 @@ class Grasp:
         drawn_as = profile(self.profile).drawn_as or self.profile
         key = f"{self.object}/{self.case}/{self.repeat}/{drawn_as}/{self.attempt}/{part}"
         return generator_of(self.seed, key)
-
-
-SampleCallback = Callable[[World, Command], None]
 
 
 class Simulation:
@@ -374,14 +371,12 @@ class Simulation:
 def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
-    on_sample: SampleCallback | None = None,
 ) -> Recording:
     """Simulate one grasp and return its recording with truth and labels.
 
     Args:
         grasp: the grasp.
         parameters: parameters of a uSkin; by default `UskinParameters()`.
-        on_sample: function that is called after each sample, for instance to draw a picture.
 
     Returns:
         Recording of four fingertips at 150 Hz. The metadata of a grasp that was never
@@ -396,8 +391,6 @@ def simulate(
     simulation = Simulation(grasp, parameters, plan=plan)
     while not simulation.is_over:
         simulation.step()
-        if on_sample is not None and simulation.command is not None:
-            on_sample(simulation.world, simulation.command)
     return simulation.recording()
 
 

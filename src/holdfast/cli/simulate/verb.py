@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.extensions import SimulatorOptions
-from holdfast.cli.options import RARE, EngineOptions, ForceOption, FpsOption, JsonOption
+from holdfast.cli.options import EngineOptions, ForceOption, FpsOption, JsonOption
 from holdfast.cli.simulate.options import GraspOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
@@ -21,13 +21,6 @@ def simulate(
     options: GraspOptions,
     simulators: SimulatorOptions,
     parallel: EngineOptions,
-    film: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write a film of the first grasp to this .gif, .png, .webp or .mp4 file."
-        ),
-        RARE,
-    ] = None,
     video: Annotated[
         bool,
         typer.Option(
@@ -68,22 +61,13 @@ def simulate(
         names = simulator.simulate(out, options, values, engine=engine, force=force)
         text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
-        from holdfast.files import refuse_overwrite, whole_file
         from holdfast.simulated_grasps import film_all, simulate_grasps
-        from holdfast.twin import render
 
-        if film is not None:
-            render.check_film(film)
-            refuse_overwrite(film, force=force)  # before minutes of simulation
         profile, planned = options.profile, options.plan(engine)
         out.mkdir(parents=True, exist_ok=True)
         names = simulate_grasps(
             planned, out, engine=engine, force=force, notify=print_message, steps=progress
         )
-        if film is not None:
-            print_message(f"rendering {planned[0].name}: about a minute")
-            with whole_file(film, force=force) as part:
-                render.film(planned[0], part)
         if video:
             film_all(planned, out, fps, engine=engine, force=force, steps=progress)
         n_failed = sum("-failed" in name for name in names)
