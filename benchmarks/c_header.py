@@ -129,20 +129,20 @@ def measure(n_updates: int, hand) -> None:
     with TemporaryDirectory() as folder:
         made = programs(Path(folder), hand)
         detectors = {name: Detector(model, hand) for name, model in models().items()}
-        found: dict[tuple[str, str], list[float]] = {key: [] for key in made}
-        found |= {(name, "Detector.update"): [] for name in detectors}
+        costs: dict[tuple[str, str], list[float]] = {key: [] for key in made}
+        costs |= {(name, "Detector.update"): [] for name in detectors}
         n_blocks = n_updates // BLOCK // N_ROUNDS
         for part in range(N_ROUNDS):
             for key, program in made.items():
                 out = subprocess.run([program, str(n_blocks)], check=True, capture_output=True)
-                found[key] += map(float, out.stdout.split())
+                costs[key] += map(float, out.stdout.split())
             for name, detector in detectors.items():
                 for k in range(part * n_blocks * 10, (part + 1) * n_blocks * 10):
                     start = time.perf_counter()
                     detector.update(samples[k % 256], k / RATE)
-                    found[name, "Detector.update"].append(time.perf_counter() - start)
+                    costs[name, "Detector.update"].append(time.perf_counter() - start)
     print(f"load of the machine {os.getloadavg()[0]:.1f}, {os.cpu_count()} processors")
-    for (name, kind), values in sorted(found.items()):
+    for (name, kind), values in sorted(costs.items()):
         low, middle, high = 1e6 * np.percentile(values, [5, 50, 99])
         print(f"{name:13} {kind:18} p5 {low:6.2f}  p50 {middle:6.2f}  p99 {high:8.2f} us"
               f"  (goal in C {BARS[name]})")  # fmt: skip
@@ -153,8 +153,8 @@ def fuzz(n_samples: int, hand) -> None:
     for name, model in models().items():
         python, c = both(model, hand, RATE)
         n = n_samples // len(BARS)
-        for given, when in random_samples(np.random.default_rng(0), hand, RATE, n):
-            compare(python, c, given, when)
+        for readings, when in random_samples(np.random.default_rng(0), hand, RATE, n):
+            compare(python, c, readings, when)
         print(f"{name}: {n} random samples are equal")
 
 

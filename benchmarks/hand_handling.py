@@ -147,7 +147,7 @@ def moments_by(name: str, grasps: Sequence[HandGrasp]) -> list[Moments | None]:
     if name == "itself":
         return [location_and_scale(x.handling) if len(x.handling) else None for x in grasps]
     default = default_handling(grasps)
-    return [None if own is None else default for own in others]
+    return [None if moments is None else default for moments in others]
 
 
 def folds_of(grasps: Sequence[HandGrasp], n_folds: int) -> np.ndarray:

@@ -257,7 +257,7 @@ def installed_distributions(name: str) -> "Iterator[Distribution]":
     """
     from importlib.metadata import distributions
 
-    return (found for found in distributions(name=name) if found.read_text("INSTALLER"))
+    return (x for x in distributions(name=name) if x.read_text("INSTALLER"))
 
 
 def other_project() -> str:
@@ -286,7 +286,7 @@ def package_versions() -> dict[str, dict[str, str | None]]:
                 group[match["package"]] = None
     # "all" requires other extras of this package, not packages
     others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra != "all")
-    return versions | {"all": {name: found for group in others for name, found in group.items()}}
+    return versions | {"all": {name: text for group in others for name, text in group.items()}}
 
 
 def listen_error(host: str, port: int, cause: Exception) -> OutputError:

@@ -147,11 +147,11 @@ def true_updates(recording: Recording) -> Recording:
         name: held_rows(module.readings[:HELD_ROWS], module.sensor, module.rate)
         for name, module in modules.items()
     }
-    known = [n_rows for n_rows in held.values() if n_rows is not None]
-    every = min(known, default=1.0) > 1.0
+    counted_rows = [n_rows for n_rows in held.values() if n_rows is not None]
+    every = min(counted_rows, default=1.0) > 1.0
     updates = {}
     for name, module in modules.items():
-        n_rows = held[name] or (min(known) if every else 1.0)
+        n_rows = held[name] or (min(counted_rows) if every else 1.0)
         rate = 1 / (n_rows * module.period)
         if n_rows == 1.0 or not (every or rate < MIN_UPDATE_RATE):
             continue
@@ -204,11 +204,13 @@ def resample(recording: Recording, rate: float) -> Recording:
         bounds = [0, *cuts.tolist(), module.n_samples]
         pieces = []
         for first, last in pairwise(bounds):
-            own = module.times[first:last]
+            stretch_times = module.times[first:last]
             values = np.asarray(module.readings[first:last], dtype=np.float64)
-            reached = ((own - own[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
+            reached = ((stretch_times - stretch_times[0] + TOLERANCE_PERIODS / rate) * rate).astype(
+                np.int64
+            )
             change = _interpolated if rate * module.period >= 1 else _averaged
-            pieces.append(change(own, values, reached, rate))
+            pieces.append(change(stretch_times, values, reached, rate))
         times = np.concatenate([times for times, _ in pieces])
         readings = np.concatenate([readings for _, readings in pieces])
         bare = replace(module, times=times, readings=readings, labels=())

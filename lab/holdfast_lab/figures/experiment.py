@@ -133,9 +133,9 @@ def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, StateCod
             names.append(name)
             continue
         # Where both are known; samples without a label or without an estimate do not count.
-        known = (series.labels != UNKNOWN) & (codes != UNKNOWN)
-        correct = ((series.labels == STABLE) == (codes == STABLE))[known]
-        accuracy = f"{100 * np.mean(correct):.1f} % correct" if known.any() else "no label"
+        decided = (series.labels != UNKNOWN) & (codes != UNKNOWN)
+        correct = ((series.labels == STABLE) == (codes == STABLE))[decided]
+        accuracy = f"{100 * np.mean(correct):.1f} % correct" if decided.any() else "no label"
         names.append(f"{literal(name)}\n{accuracy}")
     axes.set_yticks(range(len(strips)), names)
     axes.set_ylim(len(strips) - 0.5, -0.5)

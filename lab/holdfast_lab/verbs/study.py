@@ -60,8 +60,8 @@ def study(
     from holdfast_lab.study.run import STUDY, run_study
 
     if (data is None) != twin:
-        given = "both" if twin else "neither"
-        raise ValueError(f"a folder of recordings or --twin expected, {given} given")
+        sources = "both" if twin else "neither"
+        raise ValueError(f"a folder of recordings or --twin expected, {sources} given")
     if quick and full:
         raise ValueError("--quick or --full expected, both given")
     if seed < 0:

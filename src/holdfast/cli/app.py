@@ -188,8 +188,8 @@ def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
     def run(*, help_all: HelpAllOption = False, **values: Any) -> None:  # noqa: ANN401
         spread(**values)
 
-    own, shared = (inspect.signature(x).parameters for x in (run, spread))
-    options = [*shared.values(), own["help_all"]]
+    options_of_run, shared = (inspect.signature(x).parameters for x in (run, spread))
+    options = [*shared.values(), options_of_run["help_all"]]
     # Typer reads the options from the signature and the annotations.
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}

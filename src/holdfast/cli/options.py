@@ -251,8 +251,8 @@ class DetectorOptions:
             )
         model = Model.load(name)
         chosen = {"min_duration": self.debounce, "hysteresis": self.hysteresis}
-        given = {key: value for key, value in chosen.items() if value is not None}
-        return replace(model, name=model.name or name, debounce=replace(model.debounce, **given))
+        changes = {key: value for key, value in chosen.items() if value is not None}
+        return replace(model, name=model.name or name, debounce=replace(model.debounce, **changes))
 
     def create_stream(
         self, model: "Model", source: "Source", start: StartOptions

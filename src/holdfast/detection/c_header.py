@@ -36,7 +36,7 @@ def kernel_text() -> str:
             return ""
         joined.add(name)
         text = (folder / name).read_text("utf-8")
-        return re.sub(r'#include "(\S+)"\n', lambda found: text_of(found[1]), text)
+        return re.sub(r'#include "(\S+)"\n', lambda include: text_of(include[1]), text)
 
     return text_of("holdfast.c").strip()
 

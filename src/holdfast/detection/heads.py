@@ -517,18 +517,20 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         """Return mean and scale of a head, moved with those features that `stable` has, too."""
         mean, scale = head.rule.moments
         columns, n = self.indices(head), len(before[0])
-        own = columns < n  # the features of `stable` are the first
-        ratio = after[1][columns[own]] / before[1][columns[own]]
-        mean[own] = after[0][columns[own]] + ratio * (mean[own] - before[0][columns[own]])
-        scale[own] *= ratio
+        is_stable = columns < n  # the features of `stable` are the first
+        ratio = after[1][columns[is_stable]] / before[1][columns[is_stable]]
+        mean[is_stable] = after[0][columns[is_stable]] + ratio * (
+            mean[is_stable] - before[0][columns[is_stable]]
+        )
+        scale[is_stable] *= ratio
         return mean, scale
 
     def without_thresholds(self, name: HeadName) -> "FingerModel":
         """Return the model whose own handling does not set the threshold of a head."""
         replace = msgspec.structs.replace
         handling = {
-            sensor: replace(own, thresholds={k: t for k, t in own.thresholds.items() if k != name})
-            for sensor, own in self.handling.items()
+            sensor: replace(x, thresholds={k: t for k, t in x.thresholds.items() if k != name})
+            for sensor, x in self.handling.items()
         }
         return replace(self, handling=handling)
 
@@ -580,11 +582,11 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 0.5 * (1.0 + math.exp(-2.0 * self.switching_rate * seconds))
 
 
-def check_limit(what: str, given: float, most: float) -> None:
+def check_limit(what: str, value: float, most: float) -> None:
     """Refuse a number of things above a limit.
 
     Raises:
         ModelError: it is above the limit.
     """
-    if given > most:
-        raise ModelError(f"at most {most:.7g} {what} expected, {given} given")
+    if value > most:
+        raise ModelError(f"at most {most:.7g} {what} expected, {value} given")

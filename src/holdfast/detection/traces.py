@@ -133,8 +133,10 @@ class FingerTrace(NamedTuple):
     def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
         """Return the estimates of these samples."""
         # None instead of a column: the model has no such head.
-        given = (self.slip_probability, self.slip_speed, self.slip_distance)
-        slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
+        slip_columns = (self.slip_probability, self.slip_speed, self.slip_distance)
+        slips = (
+            repeat(None) if column is None else column[rows].tolist() for column in slip_columns
+        )
         columns = (
             column[rows] if column is self.faulty_taxels else column[rows].tolist()
             for column in self[:-3]
@@ -189,8 +191,8 @@ class Detection:
             return pd.Categorical.from_codes(codes, [word.value for word in kind])
 
         def texts(masks: Sequence[Mask], names: Callable[[Mask], Iterable[object]]) -> list[str]:
-            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
-            return [known[mask] for mask in masks]
+            text_of_mask = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
+            return [text_of_mask[mask] for mask in masks]
 
         parts = []
         for finger, trace in self.fingers.items():

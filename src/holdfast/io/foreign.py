@@ -105,8 +105,8 @@ def read_foreign(
         ProposalError: the file does not say its layout.
         RecordingError: the child refuses it, ends, or takes more time or memory than it may.
     """
-    given = {key: one.to_dict() for key, one in (sensors or {}).items()}
-    options = {"format": name, "sensors": given, "columns": columns, "accept": accept}
+    skins = {key: skin.to_dict() for key, skin in (sensors or {}).items()}
+    options = {"format": name, "sensors": skins, "columns": columns, "accept": accept}
     for document, arrays in _values("import", path, options, limited=limited):
         if not arrays:
             report(os.fsdecode(document))
@@ -286,8 +286,8 @@ def end_children() -> None:
 
 
 def _pipe(pipe: Any) -> BinaryIO:  # noqa: ANN401 (subprocess declares it as optional)
-    found: BinaryIO = pipe
-    return found
+    stream: BinaryIO = pipe
+    return stream
 
 
 # What follows runs in the child.
@@ -372,7 +372,7 @@ def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]
     lines: list[str] = []
     more: dict[str, object] = {}
     if takes_sensors(name):
-        sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
+        sensors = {key: Sensor.from_dict(skin) for key, skin in request.options["sensors"].items()}
         columns = msgspec.convert(request.options["columns"], Columns | None)
         more = {"sensors": sensors, "columns": columns, "report": lines.append}
         more["accept"] = request.options["accept"]

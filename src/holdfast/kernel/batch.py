@@ -31,9 +31,9 @@ _limit: ContextVar[int | None] = ContextVar("limit", default=None)
 def max_threads() -> int:
     """Return how many threads a call may use: by the limit, OMP_NUM_THREADS, or the processors."""
     limit = _limit.get()
-    given = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
-    if limit or given.isdecimal():
-        return limit or max(int(given), 1)
+    text = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
+    if limit or text.isdecimal():
+        return limit or max(int(text), 1)
     return usable_processors()
 
 

@@ -127,8 +127,8 @@ def check_health(source: Source, seconds: float) -> HealthCheck:
         # The means in which the touch was found begin earlier.
         n = int(np.searchsorted(times, end - AVERAGED_SECONDS))
         modules[name] = module_health(name, source.sensors[name], times[:n], readings[:n])
-        found = layout_findings(readings[:n], source.sensors[name], modules[name].unit)
-        layout += [f"{name}: {finding.text}" for finding in found]
+        findings = layout_findings(readings[:n], source.sensors[name], modules[name].unit)
+        layout += [f"{name}: {finding.text}" for finding in findings]
     touch = (touched, round(end - first, 1)) if touches else None
     return HealthCheck(date.today().isoformat(), n_lost, modules, touch, tuple(layout))
 

@@ -175,10 +175,12 @@ class _FingerReadings:
         self._moved |= moved
         self._n_moved += bool(np.abs(change).max() > self._least_change)
         self._drift.update(np.einsum("ijk,ik->j", self._sensor.rotations, change), time)
-        found = self._drifting()
+        notices = self._drifting()
         if not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
-            axes = [axis for axis, known in zip("xyz", self._moved, strict=True) if not known]
-            found.append(MISSING_AXES.format(" and ".join(axes)))
+            axes = [
+                axis for axis, has_moved in zip("xyz", self._moved, strict=True) if not has_moved
+            ]
+            notices.append(MISSING_AXES.format(" and ".join(axes)))
         normal = float((self._weights * change).sum())
         self._largest = max(self._largest, abs(normal))
         if time - self._start <= START_NOISE_SECONDS:
@@ -192,8 +194,8 @@ class _FingerReadings:
         else:
             self._pulled_since = min(self._pulled_since, time)
             if time - self._pulled_since >= PULL_SECONDS:
-                found.append(PULLED)
-        new = [text for text in found if text not in self._reported]
+                notices.append(PULLED)
+        new = [text for text in notices if text not in self._reported]
         self._reported.update(new)
         return new
 

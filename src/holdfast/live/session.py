@@ -241,10 +241,10 @@ class Session:
 
     def latency(self) -> Latency:
         """Compute the percentiles of the newest latencies."""
-        known = self._latencies[: min(self._n_latencies, MAX_LATENCIES)]
-        if not len(known):
+        latencies = self._latencies[: min(self._n_latencies, MAX_LATENCIES)]
+        if not len(latencies):
             return Latency(np.nan, np.nan, np.nan)
-        return Latency(*np.percentile(known, (50, 99, 100)).tolist())
+        return Latency(*np.percentile(latencies, (50, 99, 100)).tolist())
 
     def _run(self) -> None:
         try:

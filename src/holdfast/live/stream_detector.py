@@ -246,10 +246,10 @@ class StreamDetector:
         Raises:
             ValueError: the threshold is not from 0 to 1.
         """
-        own = {
+        limits = {
             name: self.model.finger(name, s).stable.threshold for name, s in self.fingers.items()
         }
-        thresholds = own if threshold is None else dict.fromkeys(own, threshold)
+        thresholds = limits if threshold is None else dict.fromkeys(limits, threshold)
         check_thresholds(thresholds)
         if self._detector is not None:
             self._detector.set_thresholds(thresholds)

@@ -125,10 +125,10 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
         # (n_fingers, n) latest value of each finger at each instant: index 0, before its first
         # sample, is UNKNOWN, or not dead.
         table = np.zeros((len(hand), len(times)), dtype=np.int8)
-        for row, finger, own in zip(table, hand, values, strict=True):
-            if own is not None:
+        for row, finger, finger_values in zip(table, hand, values, strict=True):
+            if finger_values is not None:
                 at = np.searchsorted(finger.times, times, side="right")
-                row[:] = np.concatenate([[UNKNOWN], own])[at]
+                row[:] = np.concatenate([[UNKNOWN], finger_values])[at]
         return table
 
     def of_hand(codes: Sequence[Codes], dead: Flags) -> Codes:

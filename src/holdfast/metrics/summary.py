@@ -263,8 +263,8 @@ class ResultTotal:
         if results.hand is not None:
             group.hand.append(results.hand)
         for name, counts in results.slips.items():
-            known = [self.slips[name]] if name in self.slips else []
-            self.slips[name] = SlipCounts.total([*known, counts])
+            before = [self.slips[name]] if name in self.slips else []
+            self.slips[name] = SlipCounts.total([*before, counts])
             group.slips = SlipCounts.total([group.slips, counts])
         for name, samples in results.samples.items():
             part = BinnedSamples.of(samples) if self.binned else samples

@@ -168,8 +168,8 @@ def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[La
         recording: with the truth.
         rule: thresholds and margins.
     """
-    truth, known = recording.truth, fingers_with_truth(recording)
-    return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in known}
+    truth, names = recording.truth, fingers_with_truth(recording)
+    return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in names}
 
 
 def labels_by_rule(labels: Sequence[Label]) -> bool:

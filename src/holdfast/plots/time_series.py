@@ -174,14 +174,14 @@ def draw_components(axes: Axes, series: FingerSeries) -> None:
 def draw_sigma(axes: Axes, series: FingerSeries) -> None:
     """Draw sigma; on a logarithmic axis if peaks would flatten everything else."""
     draw_curve(axes, series, series.sigma, INK, 0.8)
-    known = series.sigma[np.isfinite(series.sigma) & (series.sigma > 0)]
-    if not len(known) or known.max() <= LOG_SCALE_RATIO * np.median(known):
+    sigma = series.sigma[np.isfinite(series.sigma) & (series.sigma > 0)]
+    if not len(sigma) or sigma.max() <= LOG_SCALE_RATIO * np.median(sigma):
         axes.set_ylim(bottom=0)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         return
     # From the 0.5 % quantile: single values near 0 would take most of a logarithmic axis.
     axes.set_yscale("log", nonpositive="clip")
-    axes.set_ylim(np.quantile(known, 0.005) / 1.5, known.max() * 1.5)
+    axes.set_ylim(np.quantile(sigma, 0.005) / 1.5, sigma.max() * 1.5)
     axes.yaxis.set_major_locator(LogLocator(numticks=4))
     axes.yaxis.set_minor_locator(NullLocator())
 

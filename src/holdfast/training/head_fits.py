@@ -164,9 +164,9 @@ def missing_heads(
     for finger, samples in causes.items():
         if model.finger(finger).head("cause") is None:
             counts = np.bincount(np.asarray(samples.values), minlength=len(CAUSES) + 1)[1:]
-            given = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
+            counted = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
             yield (
-                f"{names[finger]}: unstable samples {', '.join(given)} given, at least "
+                f"{names[finger]}: unstable samples {', '.join(counted)} given, at least "
                 f"{MIN_CAUSE_SAMPLES} of each of two causes expected; the model names no cause "
                 "there"
             )

@@ -199,8 +199,8 @@ class Setting:
     @property
     def debounce(self) -> Debounce:
         """Debouncing of the model; minimum duration and filter are those of the adapted model."""
-        known = Debounce() if self.init is None else self.init.debounce
-        return Debounce(known.min_duration, self.hysteresis, self.hold, known.switching)
+        adapted = Debounce() if self.init is None else self.init.debounce
+        return Debounce(adapted.min_duration, self.hysteresis, self.hold, adapted.switching)
 
     @property
     def rate(self) -> float | None:

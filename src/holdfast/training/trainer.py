@@ -158,9 +158,9 @@ def train(
     blocks = [recording.blocks for recording in trainer.data.scan.recordings]
     model = model.with_training(provenance, blocks)
     init = trainer.setting.init
-    known = () if init is None else tuple(known_recordings(init, trainer.data.scan))
+    names = () if init is None else tuple(known_recordings(init, trainer.data.scan))
     tares = LoadedTares(scored.n_loaded, len(recordings))
-    return Trained(model, metrics, trainer.setting.split, tares, known)
+    return Trained(model, metrics, trainer.setting.split, tares, names)
 
 
 class OutOfFold(NamedTuple):
@@ -227,15 +227,15 @@ class _Trainer:
             )
             setting = replace(setting, split="time")
         data_split = split_data(scan.recordings, setting.split, setting.seed)
-        own = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
+        slips = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
         plan = SamplesPlan(
-            scan, setting, data_split, own or setting.features,
+            scan, setting, data_split, slips or setting.features,
             only_stable=setting.init is not None,
         )  # fmt: skip
         samples = gather_samples(recordings, plan, engine, progress)
-        if own and not samples.of("slip"):
+        if slips and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
-        data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
+        data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(slips))
         return cls(recordings, setting, data, warn, progress, engine)
 
     def check(self) -> None:
@@ -277,16 +277,16 @@ class _Trainer:
         if setting.trials is not None:
             reference = {finger: setting.recipe_of(finger).reference for finger in fingers}
             return [reference for _ in left_out_units]
-        found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
+        choices: list[dict[str, Parameters]] = [{} for _ in left_out_units]
         if init is not None:
-            for left_out, parameters_of in zip(left_out_units, found, strict=True):
+            for left_out, parameters_of in zip(left_out_units, choices, strict=True):
                 for finger, pool in fingers.items():
                     prior = init.finger(finger).stable.rule
                     adaptation = choose_adaptation(pool, prior, left_out)
                     parameters_of[finger] = adaptation.parameters
                     if not left_out:  # the final model: the one that the user gets
                         self.warn(adaptation.describe(init.name or "the model to adapt", finger))
-            return found
+            return choices
         tasks = (
             (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger)
             for left_out in left_out_units

@@ -68,8 +68,8 @@ def mounted(tip: Sensor) -> Array:
         True
     """
     pad = sensor("uskin-curved").positions
-    own = tip.positions @ MODULE_TO_FINGERTIP.T
-    result: Array = pad.min(axis=0) + (own - own.min(axis=0)) * (
-        np.ptp(pad, axis=0) / np.ptp(own, axis=0)
+    positions = tip.positions @ MODULE_TO_FINGERTIP.T
+    result: Array = pad.min(axis=0) + (positions - positions.min(axis=0)) * (
+        np.ptp(pad, axis=0) / np.ptp(positions, axis=0)
     )
     return result

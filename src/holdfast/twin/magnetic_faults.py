@@ -67,13 +67,13 @@ class MagneticFaults:
             >>> MagneticFaults.parse("field=300,turn-time=3").turn_time
             3.0
         """
-        known = [part.name.replace("_", "-") for part in fields(cls)]
+        names = [part.name.replace("_", "-") for part in fields(cls)]
         values: dict[str, float] = {}
-        for pair in filter(None, (each.strip() for each in text.split(","))):
+        for pair in filter(None, (text_part.strip() for text_part in text.split(","))):
             name, _, value = pair.partition("=")
-            if name not in known or name.replace("-", "_") in values:
+            if name not in names or name.replace("-", "_") in values:
                 raise ValueError(
-                    f"--faults with each of {', '.join(known)} at most once expected, "
+                    f"--faults with each of {', '.join(names)} at most once expected, "
                     f"{pair!r} given"
                 )
             try:
@@ -115,7 +115,7 @@ class MagneticFaults:
             rest: (n_taxels, 3) readings of each finger without load [count].
             seed: of the units; another one is another hand.
         """
-        field, found = self.field_at(times), {}
+        field, counts_by_finger = self.field_at(times), {}
         numbers = np.rint(np.asarray(times) * 1e6).astype(np.int64)
         for index, (name, sensor) in enumerate(sensors.items()):
             unit = np.random.default_rng([seed, index])
@@ -131,8 +131,8 @@ class MagneticFaults:
                     values[k] += AGEING_OF_NOISE * age * drawn.standard_normal(shape)
                     if drawn.random() < self.zero_share:
                         values[k, drawn.integers(sensor.n_taxels)] = 0
-            found[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
-        return found
+            counts_by_finger[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
+        return counts_by_finger
 
 
 WITHOUT_FAULTS = MagneticFaults()

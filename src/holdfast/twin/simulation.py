@@ -303,7 +303,7 @@ class Simulation:
             if finger not in self._readouts:
                 self._readouts[finger] = skin.readout(self.grasp.generator(f"skin {finger}"))
             readings[finger] = self._readouts[finger].read(forces[None], time)
-        return {finger: own[0] for finger, own in self._with_faults(readings, time).items()}
+        return {finger: x[0] for finger, x in self._with_faults(readings, time).items()}
 
     def _with_faults(self, readings: dict[str, Readings], times: Array) -> Mapping[str, Readings]:
         """Return the readings (n, n_taxels, 3) of each finger with the troubles of the skins."""

@@ -50,11 +50,11 @@ class RosHand(HandDevice):
     """
 
     def __init__(
-        self, link: Link, given: Parameters, topics: Mapping[str, str], states: str | None
+        self, link: Link, parameters: Parameters, topics: Mapping[str, str], states: str | None
     ) -> None:
-        self.name = given.text
+        self.name = parameters.text
         self._link, self._topics = link, dict(topics)
-        self._states_topic, self._shared = states, given.shared
+        self._states_topic, self._shared = states, parameters.shared
         self._publishers: dict[str, Publisher] = {}
         self._take_states: TakeStates | None = None
         # Valid joint states and when they were read, newest last; `_poll` adds and drops them.

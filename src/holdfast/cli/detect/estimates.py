@@ -88,10 +88,10 @@ def _read_parts(
         if Tare.parse(model.tare).kind == "interval":
             return iter([whole()])  # the interval may lie after the first part
         return chain([first], parts)
-    given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
+    text = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
-        raise ModelError(f"{given} within 20 % (--rate resample accepts it)")
-    print_message(f"{given}: resampled")
+        raise ModelError(f"{text} within 20 % (--rate resample accepts it)")
+    print_message(f"{text}: resampled")
     return iter([resample(whole(), model.rate)])
 
 

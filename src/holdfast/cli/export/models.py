@@ -95,7 +95,7 @@ def export_model(
         print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
         print_line(f"  state      {header.state_size:9} bytes, one for each hand")
         print_line(f"  constants  {header.constants_size:9} bytes")
-        known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
-        print_line(f"  code       {known}")
+        size = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
+        print_line(f"  code       {size}")
         if header.double_fields:
             print_line(f"  double     {', '.join(header.double_fields)}: they hold times")

@@ -85,11 +85,11 @@ def teach(
 
     guide.check(source, data, speed)
     refuse_overwrite(out, force=force)
-    given, engine = Model.load(model), parallel.start()
-    base, steps, path = given, [], data
+    base_model, engine = Model.load(model), parallel.start()
+    base, steps, path = base_model, [], data
     if path is None:
-        folder = guide.run(source, given, out, speed)
-        base, is_calibrated = calibrated(given, folder)
+        folder = guide.run(source, base_model, out, speed)
+        base, is_calibrated = calibrated(base_model, folder)
         steps, path = folder.results, folder.path
         if not any(result.n_slides for result in folder.kept):
             if not is_calibrated:
@@ -111,6 +111,6 @@ def teach(
     if as_json:
         print_json({**taught.document(out), "steps": steps})
         return
-    print_taught(taught, given.name or model)
+    print_taught(taught, base_model.name or model)
     print_line()
     print_line(f"{out}: taught by {taught.n_recordings} recordings")

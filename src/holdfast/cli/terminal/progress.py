@@ -57,8 +57,8 @@ def progress(
         total: sum of the costs of all items; by default the length of `items`, if it has one.
         cost: function that returns the cost of an item, in any unit.
     """
-    known = total if total is not None else getattr(items, "__len__", lambda: None)()
-    with ProgressBar(what, known) as bar:
+    length = total if total is not None else getattr(items, "__len__", lambda: None)()
+    with ProgressBar(what, length) as bar:
         for item in items:
             yield item
             bar.advance(cost(item))

@@ -321,6 +321,6 @@ class ReplaySource(Player):
 
     def metadata_of(self, first: Recording) -> dict[str, object]:
         """Return the metadata of the recording, with this source and the original one."""
-        own = dict(first.metadata)
-        recorded_from = {"recorded_from": own["source"]} if "source" in own else {}
-        return own | recorded_from | {"source": self.name}
+        metadata = dict(first.metadata)
+        recorded_from = {"recorded_from": metadata["source"]} if "source" in metadata else {}
+        return metadata | recorded_from | {"source": self.name}

@@ -112,7 +112,7 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
     Raises:
         RecordingError: a group lacks a column.
     """
-    found: dict[Group, dict[tuple[int, str], str]] = {}
+    cells_of_group: dict[Group, dict[tuple[int, str], str]] = {}
     doubled: dict[Group, tuple[str, str]] = {}
     for name in names:
         if len(name) > MAX_NAME:
@@ -123,11 +123,13 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
                 parts = match.groupdict()
                 taxel = int(parts.get("taxel", FIRST_TAXEL))
                 group = Group(form, parts["head"], parts.get("mid", ""), parts["tail"], unit)
-                other = found.setdefault(group, {}).setdefault((taxel, parts["axis"].lower()), name)
+                other = cells_of_group.setdefault(group, {}).setdefault(
+                    (taxel, parts["axis"].lower()), name
+                )
                 if other != name:
                     doubled[group] = other, name
     groups: dict[Group, Cells] = {}
-    for group, cells in found.items():
+    for group, cells in cells_of_group.items():
         numbers = sorted({taxel for taxel, _ in cells})
         whole = [(taxel, axis) for taxel in numbers for axis in "xyz"]
         is_run = numbers[-1] - numbers[0] == len(numbers) - 1
@@ -155,8 +157,8 @@ def module_names(groups: Sequence[Group]) -> list[str]:
         ['B0', 'B1']
     """
     if len(groups) == 1:
-        own = re.fullmatch(r"(.+)[._]t", groups[0].head)  # of holdfast's own CSV
-        return [own[1] if own else ""]
+        match = re.fullmatch(r"(.+)[._]t", groups[0].head)  # of holdfast's own CSV
+        return [match[1] if match else ""]
     return different_parts([f"{group.head} {group.mid}" for group in groups])
 
 

@@ -404,8 +404,10 @@ def read_head(path: Path) -> TableHead:
             for number, line in enumerate(_first_lines(file), start=1):
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
-                elif number == 1 and (given := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))):
-                    separators = given["separator"]
+                elif number == 1 and (
+                    separator_line := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))
+                ):
+                    separators = separator_line["separator"]
                 elif line.strip():
                     lines = [line, file.readline(MAX_HEAD_SIZE)]
                     names, separator, n = _header(lines, file, separators)
@@ -521,14 +523,14 @@ def _names(header: str, following: str, separators: str) -> tuple[tuple[str, ...
     It is the first that gives several names, and as many cells in the following line; else the
     first that gives several.
     """
-    found: tuple[tuple[str, ...], str] | None = None
+    several: tuple[tuple[str, ...], str] | None = None
     for separator in separators:
         names = _cells(header, separator)
         if len(names) > 1:
-            found = found or (names, separator)
+            several = several or (names, separator)
             if len(_cells(following, separator)) == len(names):
                 return names, separator
-    return found or ((header.strip().strip('"'),), separators[0])
+    return several or ((header.strip().strip('"'),), separators[0])
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:

@@ -271,8 +271,10 @@ def change_points(times: Array, force: npt.NDArray[np.floating], period: float) 
     """
     from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-    known = np.isfinite(force).all(axis=1)
-    known_times, values = (times, force) if known.all() else (times[known], force[known])
+    is_finite = np.isfinite(force).all(axis=1)
+    known_times, values = (
+        (times, force) if is_finite.all() else (times[is_finite], force[is_finite])
+    )
     n = max(round(COMPARED_TIME / period), 1)
     if len(known_times) <= 2 * n:
         return np.empty(0)

@@ -228,7 +228,7 @@ class XelaServer:
         if paused or not self._has_offset:  # time stamps never go back
             self._time_offset = max(self._time_offset, now - batch.time)
             self._has_offset = True
-        times = {name: one + self._time_offset for name, one in batch.times.items()}
+        times = {name: sample_time + self._time_offset for name, sample_time in batch.times.items()}
         packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
 
@@ -294,7 +294,9 @@ class XelaServer:
                 self._joining.discard(client)
 
     def _send(self, packet: str) -> None:
-        for client in _too_slow({one: _unsent_bytes(one) for one in self._clients}):
+        for client in _too_slow(
+            {connection: _unsent_bytes(connection) for connection in self._clients}
+        ):
             client.transport.abort()
         broadcast(self._clients, packet)
         self.n_packets += 1
