@@ -21,7 +21,7 @@ from holdfast.training.own_handling import grasped_samples
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
 NORMALISED_BY = "others", "itself", "default"
-"""What the features of a grasp may be normalised by."""
+"""Kinds of handling by which the features of a grasp are normalised."""
 ONSET_DURATION = 0.2
 """Time after a stable sample in which an unstable one shows the onset of instability [s]."""
 MIN_SAMPLES = 100

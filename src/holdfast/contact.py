@@ -161,7 +161,8 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     Attributes:
         time: time of the sample, on the clock of the source [s].
         state: UNKNOWN, NO_CONTACT, UNSTABLE or STABLE.
-        reason: why the state is UNKNOWN, or UNSTABLE whatever the probability; else empty.
+        reason: why the state is UNKNOWN, or why it is UNSTABLE although the probability is high;
+            else empty.
         stable_probability: probability that the contact is stable; NaN while UNKNOWN.
         instability: sigma, the standard deviation of the Haar details [unit of the readings];
             NaN without a full window.
@@ -279,7 +280,7 @@ class StateChanges:
 
         Args:
             states: by name.
-            time: of the sample, not before that of the previous one of the same name [s].
+            time: of the sample; it does not decrease [s].
         """
         events = []
         for name, state in states.items():

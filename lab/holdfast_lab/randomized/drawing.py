@@ -43,7 +43,7 @@ with gaps; an arm carries the hand all the time; a person does."""
 
 @dataclass(frozen=True)
 class StreamEffects:
-    """What comes between a sensor and the rows of a recording.
+    """Changes of the readings between a sensor and the rows of a recording.
 
     Attributes:
         rows_per_update: rows in which an update of the sensor is shown; 1: it updates each row.

@@ -60,7 +60,7 @@ WATCHED_AFTER_LOSS = 1.5
 
 @dataclass(frozen=True)
 class RandomHold:
-    """Which recording of a randomized hand.
+    """Identity of a recording of a randomized hand.
 
     Attributes:
         number: from 0 on; every number is another hand, sensor, object and hold.

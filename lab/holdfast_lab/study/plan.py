@@ -65,7 +65,7 @@ class Corpus(msgspec.Struct, frozen=True):
 
     @property
     def identity(self) -> tuple[str, str]:
-        """What tells its recordings from those of other corpora, and of earlier versions."""
+        """Folder and digest that identify the corpus and its version."""
         return self.folder, self.digest
 
     @property

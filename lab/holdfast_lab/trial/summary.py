@@ -51,7 +51,7 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         >>> summarize([held, held])["dropped"]
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
-    # What no force can hold tells nothing about a law.
+    # Trials that no force can hold are left out: they say nothing about a law.
     held = [result for result in results if result.held and result.feasible]
     slips = [result.slip for result in held]
     reacting = [result for result in held if not math.isnan(reaction_time(result))]

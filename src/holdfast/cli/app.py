@@ -304,7 +304,7 @@ def load_verb(name: str) -> Callable[..., None]:
 
 
 def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
-    """Return a function with the options of a verb, and those of its groups one by one.
+    """Return a function with the options of a verb and of its groups, one by one.
 
     A group is a parameter whose type is a dataclass; the fields are its options. The default of
     the parameter, or else those of the fields, are the defaults of the options. The options of
@@ -356,7 +356,7 @@ Values = dict[str, Any]
 
 
 def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
-    """Return the options of a group as parameters; those of plug-ins one after the other.
+    """Return the options of a group as parameters; options of plug-ins follow each other.
 
     Plug-ins of a group that have an option of the same name share it.
     """
@@ -376,7 +376,7 @@ def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[
 
 
 def _maker_of(group: type) -> Callable[[Values], object]:
-    """Return the function that makes the value of a group from those of its options."""
+    """Return the function that makes the value of a group from the values of its options."""
     if not issubclass(group, PluginOptions):
         return lambda values: group(**values)
     kinds = {name: type(plugin.OPTIONS) for name, plugin in group.plugins().items()}

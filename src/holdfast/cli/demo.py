@@ -129,7 +129,7 @@ def demo(
     print_paragraph(evaluation.verdict or "")
     print_line("a model of the paper's features, trained here, each grasp left out once:")
     print_paragraph(trained.verdict or "")
-    # What it shows stands last, where the eye is; all of it fits a screen of 24 lines.
+    # The result is printed last; all lines fit a screen of 24 lines.
     print_line()
     side = "before" if lead >= 0 else "after"
     print_line(f"{picture}: UNSTABLE {abs(lead):.2f} s {side} the authors' label")

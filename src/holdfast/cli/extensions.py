@@ -1,4 +1,4 @@
-"""What plug-ins add to verbs: formats of `export`, publishers of `serve`, and simulators.
+"""Plug-ins of verbs: formats of `export`, publishers of `serve`, and simulators.
 
 Such a plug-in is an object with `OPTIONS`, an instance of a frozen dataclass: its fields are the
 options that the verb gets, with their defaults, and the plug-in is used if one of them differs.
@@ -70,9 +70,9 @@ def _extension(function: str) -> Any:  # noqa: ANN401 (the function that convert
 EXPORTER_PLUGINS = PluginGroup("exporters", ("csv",), _extension("export"))
 """Formats of `holdfast export RECORDINGS`."""
 PUBLISHER_PLUGINS = PluginGroup("publishers", (), _extension("publisher"))
-"""What `holdfast serve` also publishes to."""
+"""Publishers of `holdfast serve` beside the page."""
 SIMULATOR_PLUGINS = PluginGroup("simulators", (), _extension("simulate"))
-"""What `holdfast simulate` simulates besides the grasps of an Allegro hand."""
+"""Simulators of `holdfast simulate` beside the grasps of an Allegro hand."""
 
 
 class ExporterOptions(PluginOptions):

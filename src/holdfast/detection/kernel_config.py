@@ -1,4 +1,4 @@
-"""Constants of the C kernel as arrays of its structs: those of a plan, and those of a model."""
+"""Constants of the C kernel, as arrays of its structs, from a plan and a model."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -189,7 +189,7 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
 
 
 def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]) -> list[Row]:
-    """Return the features of a finger, padded to those of the finger that has most."""
+    """Return the features of a finger, padded to the largest number of features of a finger."""
     # Scope is left out: `hand` takes the largest of values that each finger has computed anyway.
     keys = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     padding: Row = {

@@ -202,7 +202,7 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     @property
     def slip_advice(self) -> str:
-        """What sets the threshold of slips if the model reports none; empty without such a rule."""
+        """Advice on how to set the threshold of slips, if the model reports none; else empty."""
         if self.reports_slips or not self.has_slip_rule:
             return ""
         name = self.name or "the model"

@@ -20,7 +20,7 @@ MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
 PARTS = re.compile(rb'"(type|kind)"\s*:\s*"(\w+)"')
-"""What a model file has where it names the rule of a head, or a feature."""
+"""Part of a model file with the name of the rule of a head, or of a feature."""
 
 
 def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:

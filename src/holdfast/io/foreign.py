@@ -64,7 +64,7 @@ Arrays = list[npt.NDArray[Any]]
 
 
 class _Request(msgspec.Struct, frozen=True):
-    """What the child shall read, and whether with limits; paths are relative to `folder`."""
+    """Request to read a file, with or without limits; paths are relative to `folder`."""
 
     task: str
     path: bytes  # a name may be no UTF-8, which JSON cannot hold
@@ -74,7 +74,7 @@ class _Request(msgspec.Struct, frozen=True):
 
 
 class _Answer(msgspec.Struct, frozen=True):
-    """What came of it: a value in the file, the end of the values, or an error and its text."""
+    """Answer to a request: a value in the file, the end of the values, or the text of an error."""
 
     kind: Literal["ready", "value", "end", "memory", "error", "proposal"]
     text: str = ""
@@ -290,7 +290,7 @@ def _pipe(pipe: Any) -> BinaryIO:  # noqa: ANN401 (subprocess declares it as opt
     return stream
 
 
-# What follows runs in the child.
+# The child process runs the functions below.
 
 
 def serve(folder: str) -> None:

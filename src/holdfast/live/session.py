@@ -93,7 +93,7 @@ class InterpreterSettings:
         with self._lock:
             if not self._n_users:
                 self._before = sys.getswitchinterval()
-                # What the program froze itself would be thawed by `end`: then nothing is frozen.
+                # `end` would thaw objects that the program itself froze: then nothing is frozen.
                 self._freezes = gc.get_freeze_count() <= MAX_FROZEN_BY_PYTHON
                 sys.setswitchinterval(SWITCH_INTERVAL)
             self._n_users += 1
@@ -137,8 +137,8 @@ class TimedUpdate(NamedTuple):
 class Session:
     """Run a stream detector in its own thread. Leaving it as a context manager stops it.
 
-    It keeps the newest updates, which other threads read at their own pace: a reader that is too
-    slow misses some, and delays nobody. Listeners are called in the thread of the session, one
+    It keeps the newest updates, which other threads read at their own pace: a slow reader misses
+    updates, and delays no other thread. Listeners are called in the thread of the session, one
     after the other. They must return at once.
 
     Args:

@@ -36,7 +36,7 @@ BOLD: tuple[Parameters, ...] = (
 
 
 class Adaptation(NamedTuple):
-    """What is taken over from the labels.
+    """Parameters that are adapted to the labels.
 
     Attributes:
         parameters: of `Adapted`.

@@ -145,7 +145,7 @@ class Evaluation:
 
     @property
     def verdict(self) -> str | None:
-        """What the model is worth; None if it was trained on all labelled recordings."""
+        """The verdict on the model; None if it was trained on all labelled recordings."""
         n, n_unseen = len(self.metrics.recordings), len(self.unseen.recordings)
         if self.trained_on and self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
             return None

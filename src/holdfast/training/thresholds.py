@@ -204,12 +204,12 @@ class CurvePoint(msgspec.Struct, frozen=True):
 
     @property
     def scores(self) -> SlipMetrics | dict[str, Any]:
-        """What a document has of the point."""
+        """The scores of the point, for JSON."""
         stable = {"threshold": self.threshold, "stable": self.stable, "events": self.events}
         return stable if self.slips is None else self.slips
 
     def cost(self, false_alarms: float) -> tuple[float, ...]:
-        """Return what the best point has least of.
+        """Return the cost of the point, in order of importance.
 
         Few enough false alarms come first, then few missed events (the sum over all times within
         which they are counted), then few false alarms.
@@ -384,7 +384,7 @@ class Tuned:
 
     @property
     def other_head(self) -> str:
-        """What becomes of the slip head that has no part in `changes`, in one line; else empty."""
+        """Line about the slip head whose threshold was not chosen; empty without such a head."""
         if self.chosen.slips is None or self.changes is not None:
             return ""
         if self.head == "slip_changes":

@@ -85,7 +85,7 @@ class Trained:
 
     @property
     def verdict(self) -> str | None:
-        """What the model is worth; None if some recordings are `known`."""
+        """The verdict on the model; None if some recordings are `known`."""
         return None if self.known else verdict(self.cross_validation, self.tares)
 
 
@@ -216,8 +216,8 @@ class _Trainer:
             features = _that_fit(setting.features, scan.smallest, warn)
             setting = replace(setting, features=features)
         elif any(part.handling for part in init.fingers.values()):
-            # Its classifiers then have the own handling of these sensors inside their weights, so
-            # that they are adapted as they work.
+            # Adaptation starts from the calibrated classifier: the calibration becomes a part of
+            # its weights.
             setting = replace(setting, init=init.with_handling_of(scan.sensors))
         if setting.split == "recording" and init is not None and len(scan.recordings) == 1:
             # To adapt to a single grasp is allowed, though nothing else can be held out.

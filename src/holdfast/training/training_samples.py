@@ -33,7 +33,7 @@ from holdfast.training.targets import TARGETS, TargetInput, TargetSamples
 
 @dataclass(frozen=True)
 class SamplesPlan:
-    """What the training samples of any recording of a dataset depend on.
+    """Settings by which the training samples of a recording are gathered.
 
     Attributes:
         scan: of the dataset.

@@ -33,7 +33,7 @@ LAST_ACTION = 1.0
 
 
 class Script(NamedTuple):
-    """What happens while the object is held; with no field set, nothing.
+    """Events while the object is held; without any field set, there are none.
 
     Attributes:
         kinds: slip events, in turn.

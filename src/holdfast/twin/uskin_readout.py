@@ -163,7 +163,7 @@ class Taxels(NamedTuple):
 
 
 class _Constants(NamedTuple):
-    """What a fingertip does not change, for c/uskin_readout.c.
+    """Constants of a fingertip for c/uskin_readout.c.
 
     Attributes:
         taxels: properties of the taxels.
@@ -251,7 +251,7 @@ class Readout:
             parameters.thermal_time,
         )
         self._generator = generator
-        # Its own, so that a slow part of the noise leaves all other draws as they are.
+        # A separate generator, so that slow noise does not change the other draws.
         self._colour_generator = generator.spawn(1)[0]
         shape = taxels.baseline.shape
         self._state = _State(

@@ -160,7 +160,7 @@ def label_hand(times: Mapping[str, Array], labels: Mapping[str, Codes]) -> Finge
 
 
 class PreparedRecording(NamedTuple):
-    """What every method uses of one recording: its signals, and its labels at each sample."""
+    """Signals of one recording, and its labels at each sample, for all methods."""
 
     hand: HandSignal
     labelled: RecordingFeatures

@@ -1,4 +1,4 @@
-"""What a method is: features of a hand, and a way to fit a classifier to them.
+"""Method of the study: features of a hand, and a way to fit a classifier to them.
 
 Every method starts from a `HandSignal`: the tared readings and forces of the fingers of one
 recording.

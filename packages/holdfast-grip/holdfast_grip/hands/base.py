@@ -1,4 +1,4 @@
-"""What every hand does with commands."""
+"""Base class of hands: checks of commands, and their order."""
 
 import math
 import time

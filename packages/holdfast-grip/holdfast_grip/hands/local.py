@@ -79,7 +79,7 @@ class ScalarGripper(HandDevice):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the function, by the file that defines it."""
+        """Name of the claim: the function, by the file that defines it."""
         return self._resource
 
     def open(self) -> None:
@@ -153,7 +153,7 @@ class LogFile(HandDevice):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the file, by its real path."""
+        """Name of the claim: the file, by its real path."""
         return f"log:{os.path.realpath(self._path)}"
 
     def open(self) -> None:

@@ -89,7 +89,7 @@ LEAST_FRICTION = 0.25
 LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
 FALLING_STEP = 0.9
-"""What a step is larger by where the hand carries less than in the calm grip: friction falls."""
+"""Growth of a step where the hand carries less than in the calm grip: friction falls."""
 HELD_SHARE = 0.9
 """Least friction that a step can show, as a share of T/N of the calm grip, which held."""
 PRESS_TIME = 0.1
@@ -102,7 +102,7 @@ UNSTABLE_SHARE = 0.7
 """Weight of an instability without a finger that is decided to slide. With 0.4 the hand answered
 too few slides of the hard plant (12 % dropped in place of 6)."""
 KICK_STEP = 0.2
-"""What a step is larger by with a slip rule, which starts fewer of them."""
+"""Growth of a step with a slip rule, which starts fewer of them."""
 RESPONSE_MARGIN = 0.04
 """Time after the response of the hand from which a slide that goes on starts another step [s]."""
 RESERVE = 3.0

@@ -38,7 +38,7 @@ PARAMETERS = (
 
 
 class JointOutput(StrEnum):
-    """What a driver takes for each joint.
+    """Quantity that a driver takes for each joint.
 
     EFFORTS: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
     set-point of its position control.

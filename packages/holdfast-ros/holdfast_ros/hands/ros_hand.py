@@ -1,4 +1,4 @@
-"""What all hands on topics share: how they are opened, and what is checked at each command."""
+"""Base class of hands on topics: their opening, and the checks at each command."""
 
 import time
 from abc import abstractmethod
@@ -65,7 +65,7 @@ class RosHand(HandDevice):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the topic of the commands."""
+        """Name of the claim: the topic of the commands."""
         return f"{next(iter(self._topics))} {self._link.where}"
 
     @property

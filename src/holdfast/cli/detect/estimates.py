@@ -60,7 +60,7 @@ def detect_recording(
 def _read_parts(
     model: Model, path: Path, rate: RatePolicy, recording: Recording | None
 ) -> Iterator[Recording]:
-    """Yield the recording, that of the path if it is None, at the model's rate.
+    """Yield the recording at the model's rate; it is read from the path if it is None.
 
     It comes in parts, or as a whole if it is resampled or its tare is an interval.
     """

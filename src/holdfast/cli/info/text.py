@@ -9,7 +9,7 @@ from holdfast.cli.terminal.console import print_line, print_lines, print_paragra
 MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
 ANSWERS = {"stable": "STABLE", "slip": "slides", "slip_changes": "slides, begun in contact,"}
-"""What a finger does from the threshold of a head on."""
+"""Answer of a head whose value reaches its threshold."""
 # As the documents of `content_of` name them; an import of them would slow the start of the verb.
 LABELLED_STATES = ("stable", "unstable", "no_contact")
 LABEL_HEADINGS = tuple(f"{state} [s]" for state in LABELLED_STATES)

@@ -25,7 +25,7 @@ WITHOUT_CAMERA = (
     "Without --camera no slip is measured: this ends with a calibration, and the\n"
     "slips stay those that the model finds on a hand it was not trained on."
 )
-"""What the figures will rest on."""
+"""Evidence on which the figures rest."""
 
 
 @dataclass(frozen=True)

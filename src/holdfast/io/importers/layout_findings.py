@@ -1,4 +1,4 @@
-"""What readings say of their layout: signs, units, sentinels and axes that cannot be true.
+"""Find wrong layouts of readings: signs, units, sentinels and axes that cannot be true.
 
 `import`, `info` and `doctor` use it. Faults of single samples are those of the kernel.
 """

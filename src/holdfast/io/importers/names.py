@@ -13,9 +13,9 @@ from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number
 MAX_NAME = 200
 """Maximum length of a name that can say finger, taxel and axis [characters]."""
 MODULE_OF_ROWS = re.compile(r"(?:(?:sensor|module|finger)(?:[_ ]?id)?|id|name)", re.IGNORECASE)
-"""Names of a column that says of which module a row is."""
+"""Names of a column with the module of each row."""
 EPISODE_OF_ROWS = re.compile(r"(?:episode|trial)(?:[_ ]?(?:id|index))?", re.IGNORECASE)
-"""Names of a column that says of which recording a row is."""
+"""Names of a column with the recording of each row."""
 FINGER = re.compile(
     r"[\W_]*(?:thumb|index|middle|ring|little|pink(?:y|ie)|left|right|palm|finger(?:tip)?|tip|pad|"
     r"skin|sensor|module|board|hand|[lr]f?|[fmlr]f|th)?[\W_]*\d*[\W_]*",
@@ -58,7 +58,7 @@ Cells = Mapping[tuple[int, str], str]
 
 
 class Group(NamedTuple):
-    """What columns of one module have in common: their names without taxel and axis."""
+    """Common part of the columns of a module: their names without taxel and axis."""
 
     form: int
     head: str

@@ -31,7 +31,7 @@ MIN_CELLS = 4
 MAX_BLOCK = 100
 """Maximum number of lines before such a header."""
 SEPARATORS = ",;\t| "
-"""Characters between the cells of a row, of which a file has one; any number of blanks is one."""
+"""Possible separators of cells; a file uses one of them. Several blanks count as one."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
 
@@ -49,7 +49,7 @@ _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 
 
 class TableHead(NamedTuple):
-    """What is before the first row of a file.
+    """Head of a file: all lines before its first row.
 
     Attributes:
         comments: lines that begin with `#`, without the `#`.

@@ -48,7 +48,7 @@ _ONE_AXIS = re.compile(
 
 
 class ForeignFile(NamedTuple):
-    """What a file has.
+    """Arrays of a file, and its statements about them.
 
     Attributes:
         path: of the file.

@@ -1,4 +1,4 @@
-"""What findings need of a recording, which may come in parts: all but its readings."""
+"""Scan of a recording, read in parts, from which findings are made: all but its readings."""
 
 from dataclasses import replace
 from functools import cached_property
@@ -21,7 +21,7 @@ SCAN_BLOCK_SAMPLES = 4096
 
 
 class ModuleScan:
-    """What is kept of the samples of a module: 33 bytes of each.
+    """Forces, repeats and ranges of a module, from all its samples: 33 bytes of each.
 
     Args:
         module: a part of it, which is not added.
@@ -43,8 +43,8 @@ class ModuleScan:
         self.lowest, self.highest = np.inf, -np.inf
         self.rows_per_update = 1.0
         self.layout: list[LayoutFinding] = []
-        # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
-        # of its times, and its last sample. The first finite sample is the zero of all forces.
+        # Chunks collected so far, and the last time and sample of the previous chunk. The first
+        # finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
         self._forces = [np.empty((0, 3))]
         self._repeats = [np.empty(0, dtype=np.bool_)]
@@ -55,8 +55,8 @@ class ModuleScan:
         """Add the next samples."""
         labels = list(module.labels)
         if labels and self.labels and self._end < self.labels[-1].end:
-            # The label goes on after the last sample of the part before: if it begins again
-            # with the first sample here, and is the same else, the parts have cut it.
+            # An identical label at the start of this chunk is the same label, which was split at
+            # the boundary.
             before, after = self.labels[-1], labels[0]
             is_cut = after.start <= float(module.times[0])
             if is_cut and replace(after, start=before.start, end=before.end) == before:
@@ -118,7 +118,7 @@ class ModuleScan:
 
 
 class FindingsScan:
-    """What is kept of a recording.
+    """Scan of a recording.
 
     Attributes:
         modules: by name.

@@ -205,7 +205,7 @@ class _FingerLabeller:
         if self._rule.measure == "displacement":
             ratio = np.where(motion.known, self._displacement_ratio(motion, point), 0.0)
         moving = self._moving(ratio)
-        # What is set later replaces what was set before: first what holds still, then what moves,
+        # A later state replaces an earlier one: first what holds still, then what moves,
         # then what slides within it; no contact, and the ends of contacts, last.
         held = self._contact & motion.known
         timeline.set_state(held, STABLE, None, evidence_ratio(1.0, ratio))

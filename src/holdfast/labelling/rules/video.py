@@ -86,7 +86,7 @@ class SeenSlip(NamedTuple):
 
 
 class Film(NamedTuple):
-    """What a film shows beside the motion of fingertips on the object, on its regular grid.
+    """Measurements of a film beside the motion of fingertips on the object, on a regular grid.
 
     Attributes:
         levels: (n,) brightness.

@@ -71,11 +71,11 @@ STAGE_WORDS = {
     Stage.CHECK: ("ONE MOMENT", "The recording is checked."),
     Stage.DECIDE: ("GOOD", ""),
 }
-"""What a person does in each stage, and how; in ACT, the step has the words."""
+"""Instruction of each stage, and its explanation; in ACT they are those of the step."""
 
 
 class GraspResult(msgspec.Struct, frozen=True):
-    """What came of a grasp.
+    """Result of a grasp.
 
     Attributes:
         name: of the step.
@@ -102,7 +102,7 @@ class GraspResult(msgspec.Struct, frozen=True):
 
 
 class View(NamedTuple):
-    """What a person sees.
+    """Content of the screen.
 
     Attributes:
         title: which step and grasp.

@@ -19,7 +19,7 @@ from holdfast.training.classifiers.fitting import (
 from holdfast.training.classifiers.newton import Solution, fit_logistic
 
 NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
-"""What is changed of the prior: nothing; intercept and slope of its log odds; or all weights."""
+"""Parts of the prior that are changed: none; intercept and slope of its log odds; all weights."""
 
 
 @dataclass(frozen=True)
