@@ -33,7 +33,7 @@ from holdfast.detection import (  # noqa: E402
     Model,
     parse_features,
 )
-from holdfast.detection.c_header import code_size, header_of  # noqa: E402
+from holdfast.detection.c_header import header_of  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402
 
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -94,10 +94,16 @@ def symbols(text: str) -> str:
         words = ["-std=c99", "-O2", "-fno-pic", "-DHOLDFAST_API=extern", "-x", "c", "-c", "model.h"]
         subprocess.run(["cc", *words, "-o", "model.o"], check=True, cwd=folder)
         done = subprocess.run(["nm", "model.o"], check=True, capture_output=True, cwd=folder)
+        size = subprocess.run(
+            ["size", "-A", "model.o"], check=True, capture_output=True, cwd=folder
+        )
     listed = [line.split()[-2:] for line in done.stdout.decode().splitlines()]
     outside = [name for kind, name in listed if kind == "U" and not name.startswith("_")]
     changing = [name for kind, name in listed if kind in "BbDdC"]
-    return f"calls {', '.join(outside)}; data that can change: {', '.join(changing) or 'none'}"
+    sections = [line.split() for line in size.stdout.decode().splitlines()]
+    code = sum(int(words[1]) for words in sections if words and words[0].startswith(".text"))
+    data = ", ".join(changing) or "none"
+    return f"code {code} bytes; calls {', '.join(outside)}; data that can change: {data}"
 
 
 def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
@@ -108,7 +114,7 @@ def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
             header = header_of(model, hand, RATE, single=single)
             kind = "float" if single else "double"
             print(f"{name}, {kind}: state {header.state_size}, constants {header.constants_size}, "
-                  f"code {code_size(header)} bytes; {symbols(header.text)}")  # fmt: skip
+                  f"{symbols(header.text)}")  # fmt: skip
             for compiler in filter(shutil.which, ("gcc", "clang")):
                 build = folder / f"{name.split(':')[-1]}-{kind}-{compiler}"
                 build.mkdir()

@@ -2,15 +2,11 @@
 
 import math
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from importlib import resources
 from importlib.metadata import version
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -244,33 +240,3 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     ):
         lines = (f"    HOLDFAST_{prefix}_{name} = {value}" for name, value in members)
         yield "enum {\n" + ",\n".join(lines) + "\n};"
-
-
-COMPILE_SECONDS = 60.0
-"""Time after which the compiler is stopped [s]."""
-
-
-def code_size(header: CHeader) -> int | None:
-    """Return the size of the compiled functions of a header [bytes].
-
-    It is that of this machine's `cc -O2`; None if there is no `cc` or no `size`, or they fail.
-    """
-    compiler, size = shutil.which("cc"), shutil.which("size")
-    if compiler is None or size is None:
-        return None
-    with TemporaryDirectory() as folder:
-        source, compiled = Path(folder) / "model.h", Path(folder) / "model.o"
-        source.write_text(header.text)
-        options = ["-std=c99", "-O2", "-DHOLDFAST_API=extern", "-x", "c", "-c"]
-        try:
-            for command in (
-                [compiler, *options, str(source), "-o", str(compiled)],
-                [size, "-A", str(compiled)],
-            ):
-                sections = subprocess.run(
-                    command, capture_output=True, text=True, timeout=COMPILE_SECONDS, check=True
-                ).stdout
-        except (OSError, subprocess.SubprocessError):
-            return None
-    lines = [line.split() for line in sections.splitlines()]
-    return sum(int(words[1]) for words in lines if words and words[0].startswith(".text"))
