@@ -1,4 +1,4 @@
-"""Calls on a Dask cluster: few at a time, repeated if a worker dies, of one version of holdfast."""
+"""Calls on a Dask cluster: few at a time, of one version of holdfast."""
 
 import logging
 from asyncio import run, wait_for
@@ -38,8 +38,7 @@ def call_on_cluster(
 ) -> Iterator[tuple[K, T]]:
     """Make calls on a Dask cluster, which repeats the calls of a worker that died.
 
-    If a worker dies, Dask counts a failure of every call that the worker held (decision 0006).
-    So a call that Dask cancels is repeated alone. Every call uses one thread.
+    Every call uses one thread.
 
     Args:
         function: that the workers can import.
@@ -52,7 +51,7 @@ def call_on_cluster(
 
     Raises:
         EngineError: the scheduler does not answer or ends, there are no workers, a worker has no
-            holdfast or another version, or the worker of one call died each time.
+            holdfast or another version, or the workers of one call died several times.
         MissingExtra: dask is not installed.
     """
     with _client(scheduler) as client:
@@ -77,15 +76,7 @@ def call_on_cluster(
             )
         # The digest goes with each call: a worker may join while the calls run.
         common = (package_digest(), function, *copies)
-        # Calls that were on a worker that died: one of them may have killed it, which shows when
-        # each is made alone.
-        suspects: list[Call[K]] = []
-        yield from _submit(client, common, calls, suspects)
-        for call in suspects:
-            failed: list[Call[K]] = []
-            yield from _submit(client, common, [call], failed)
-            if failed:
-                raise EngineError(f"{call[0]}: its worker died each time, killed or out of memory")
+        yield from _submit(client, common, calls)
 
 
 @lru_cache
@@ -134,9 +125,9 @@ _NO_HOLDFAST = "{} cannot import this holdfast: install the same version for it 
 
 
 def _submit(
-    client: "Client", common: Arguments, calls: Iterable[Call[K]], suspects: list[Call[K]]
+    client: "Client", common: Arguments, calls: Iterable[Call[K]]
 ) -> Iterator[tuple[K, Any]]:
-    """Make calls on a cluster; append to `suspects` those whose workers died."""
+    """Make calls on a cluster."""
     from distributed import KilledWorker
 
     # A queue, as calls are added while others run, and a wait must end if there is no worker.
@@ -159,10 +150,9 @@ def _submit(
                 raise _without_workers(client)
         try:
             result = _watched(client, partial(_result, future))
-        except KilledWorker:
-            suspects.append(call)
-        else:
-            yield call[0], result
+        except KilledWorker as cause:
+            raise EngineError(f"{call[0]}: its workers died, killed or out of memory") from cause
+        yield call[0], result
 
 
 @contextmanager

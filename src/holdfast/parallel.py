@@ -1,7 +1,6 @@
 """Parallel calls: in processes of this machine by joblib, or on a Dask cluster.
 
-When a process dies, the calls that were running are made again. Results do not depend on where
-or in which order the calls are made.
+Results do not depend on where or in which order the calls are made.
 """
 
 import os
@@ -20,9 +19,6 @@ from holdfast.errors import EngineError, MissingExtra, OutputError, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
-
-MAX_RETRIES = 2
-"""Number of times that a call whose process died is made again, alone."""
 
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
@@ -140,8 +136,7 @@ class Engine(NamedTuple):
 
         Raises:
             EngineError: the cluster cannot be reached, has no workers or a worker without this
-                version of holdfast, or the process died every time that one call was made.
-                The text names that call.
+                version of holdfast, or a process died.
             MissingExtra: joblib or dask is not installed.
         """
         if self.scheduler is not None:
@@ -156,31 +151,19 @@ class Engine(NamedTuple):
 def _in_processes(
     function: Callable[..., T], calls: Iterable[Call[K]], n_jobs: int
 ) -> Iterator[tuple[K, T]]:
-    """Make calls with joblib.
-
-    A process that dies breaks the whole pool. Then each call that was running is made again
-    alone, and the other calls in a new pool.
-    """
+    """Make calls with joblib."""
     if not is_installed("joblib"):
         raise MissingExtra("joblib", "train")
     from joblib import delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # `started` has the calls that joblib took and whose result has not come: `_record` adds, the
-    # loop removes. What is left in it when the pool breaks may have killed a process.
-    rest, started = iter(calls), dict[K, Arguments]()
-    ended = False
-    while started or not ended:
-        # Alone first, then the rest: a call that kills its process ends the run at once.
-        for name in list(started):
-            yield name, _call_in_own_process(function, name, started.pop(name))
-        call_named = delayed(_call_in_worker)
-        tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
-        with suppress(TerminatedWorkerError), _WITHOUT_WARNING:
-            for name, result in _start(n_jobs, tasks):
-                del started[name]
-                yield name, result
-            ended = True
+    call_named = delayed(_call_in_worker)
+    tasks = (call_named(os.getpid(), function, *call) for call in calls)
+    try:
+        with _WITHOUT_WARNING:
+            yield from _start(n_jobs, tasks)
+    except TerminatedWorkerError as cause:
+        raise EngineError("a process died, killed or out of memory; try with fewer jobs") from cause
 
 
 class _WarningFilter:
@@ -240,13 +223,6 @@ def _backend_type() -> type[Any]:
     return SafeBackend
 
 
-def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[Call[K]]:
-    """Yield the calls, each added to `started` before."""
-    for name, arguments in calls:
-        started[name] = arguments
-        yield name, arguments
-
-
 def _call_in_worker(
     parent: int, function: Callable[..., T], name: K, arguments: Arguments
 ) -> tuple[K, T]:
@@ -266,20 +242,3 @@ def _end_with(parent: int) -> None:
 
     if os.getpid() != parent:
         Thread(target=wait, name="holdfast-parent", daemon=True).start()
-
-
-def _call_in_own_process(function: Callable[..., T], name: object, arguments: Arguments) -> T:
-    """Make one call in another process; only this call can be the cause if the process dies."""
-    from joblib import delayed
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    for _ in range(MAX_RETRIES):
-        with suppress(TerminatedWorkerError):
-            # Two jobs, as joblib makes one job in this process.
-            call = delayed(_call_in_worker)(os.getpid(), function, None, arguments)
-            ((_, result),) = _start(2, [call])
-            return cast(T, result)
-    raise EngineError(
-        f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "
-        "try with fewer jobs"
-    )
