@@ -10,10 +10,6 @@ from threading import Lock
 
 SAFE_PATH_VARIABLE = "PYTHONSAFEPATH"
 """Environment variable that keeps the working folder from the path of Python, as `python -P`."""
-CHILD_TIMEOUT = 60.0
-"""Time in which a child must answer; enough to import a plug-in [s]."""
-ANSWER_PREFIX = "answer of the plug-in: "
-"""Text before an answer: a plug-in may print as well."""
 
 
 def python_command(program: str, *arguments: str) -> list[str]:
@@ -31,32 +27,6 @@ def python_command(program: str, *arguments: str) -> list[str]:
     path = [folder for folder in sys.path if isinstance(folder, str)]
     with_path = f"import sys; sys.path[:] = {path!r}; {program}"
     return [sys.executable, "-P", "-c", with_path, *arguments]
-
-
-def answer_of_child(module: str, function: str, *words: str) -> str:
-    """Return the text that a function gives in a child process, which it may end or block.
-
-    Args:
-        module: name of the module of the function.
-        function: name of the function.
-        words: its arguments.
-    """
-    import subprocess  # not for `--help`
-
-    program = (
-        f"from {module} import {function}\n"
-        f"print({ANSWER_PREFIX!r} + {function}(*sys.argv[1:]), end='')"
-    )
-    try:
-        done = subprocess.run(
-            python_command(program, *words), stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, errors="replace", timeout=CHILD_TIMEOUT, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return f"its import takes longer than {CHILD_TIMEOUT:.0f} s"
-    # The answer comes last, after all that the plug-in prints.
-    _, answered, answer = done.stdout.rpartition(ANSWER_PREFIX)
-    return answer if answered else f"its import ends the process (exit code {done.returncode})"
 
 
 class _SafePath:

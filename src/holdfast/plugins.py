@@ -121,16 +121,16 @@ class PluginGroup(Generic[T]):
         loaded = {name: self.load(name) for name in self.names()}
         return {name: plugin for name, plugin in loaded.items() if plugin is not None}
 
-    def states(self, error: Callable[[str, str], str]) -> list[Plugin]:
+    def states(self, error: Callable[[str], str]) -> list[Plugin]:
         """Return the plug-ins, each with the reason why it is skipped, if it is.
 
         Those of the packages beside the core are no guests: they are left out if they fit.
 
         Args:
-            error: returns that reason for a kind and a name; `doctor` loads them elsewhere.
+            error: returns that reason for a name.
         """
         return [
-            Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
+            Plugin(self.kind, point.name, _package(point), refusal or error(point.name))
             for point, refusal in self._points()
             if refusal or not _is_own(point)
         ]

@@ -10,7 +10,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import Sensor
@@ -223,15 +222,9 @@ def source_state(scheme: str) -> str:
 
 
 def source_states() -> dict[str, str]:
-    """Return in a few words whether the live sources of each scheme can be reached.
-
-    Plug-ins answer in a child process, which they may end or block.
-    """
-    states = {"xela": source_state("xela")}
-    for scheme in SOURCE_PLUGINS.names():
-        if state := children.answer_of_child(__name__, "source_state", scheme):
-            states[scheme] = state
-    return {**states, "serial": source_state("serial")}
+    """Return in a few words whether the live sources of each scheme can be reached."""
+    states = {name: source_state(name) for name in ("xela", *SOURCE_PLUGINS.names(), "serial")}
+    return {name: state for name, state in states.items() if state}
 
 
 def _source_maker(scheme: str) -> "Callable[[Address], Source]":

@@ -4,7 +4,6 @@ import sys
 from importlib import metadata
 
 import numpy as np
-import pytest
 
 from holdfast import save_recording
 from holdfast.cli import main
@@ -13,12 +12,6 @@ from holdfast.devices.uri import source_states
 from holdfast.errors import DISTRIBUTION, EXTRA_PURPOSES, install_command
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, sensor
-
-
-@pytest.fixture(autouse=True)
-def no_children(monkeypatch):
-    """Start no Python for each plug-in: `tests/test_plugins.py` has what the children answer."""
-    monkeypatch.setattr("holdfast.children.answer_of_child", lambda *words: "")
 
 
 def report(capsys):
