@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
@@ -11,7 +12,6 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from msgspec import UNSET, MsgspecError, Raw, Struct, UnsetType, msgpack
 
-from holdfast.cluster import one_thread
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
 from holdfast.parallel import Engine
@@ -193,6 +193,21 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
         repeated = next(name for name in names if names.count(name) > 1)
         raise ValueError(f"two tasks are called {repeated}")
     return keys
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Make NumPy and the C kernel use one thread.
+
+    Workers would compete for processors otherwise, and a sum over several threads is rounded
+    differently.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from holdfast.kernel.batch import thread_limit
+
+    with threadpool_limits(1), thread_limit(1):
+        yield
 
 
 def _call(

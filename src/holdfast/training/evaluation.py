@@ -170,12 +170,11 @@ def evaluate(
         model: to evaluate.
         recordings: labelled; of an iterator, they are evaluated in this process.
         seed: of the bootstrap.
-        engine: that reads the recordings. On a cluster, all machines need the recordings at the
-            same paths.
+        engine: that reads the recordings.
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: the engine cannot be used.
+        EngineError: a process died.
     """
     model = Model.of(model)
     if isinstance(recordings, Sequence):
@@ -204,7 +203,7 @@ def evaluate_recordings(
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: the engine cannot be used.
+        EngineError: a process died.
     """
     parts = ((OneRecording(recordings, index),) for index in range(len(recordings)))
     trained_on: list[str] = []
