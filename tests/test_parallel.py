@@ -3,7 +3,6 @@ import signal
 import subprocess
 import sys
 import time
-import warnings
 from pathlib import Path
 
 import pytest
@@ -113,24 +112,3 @@ class TestProcesses:
     def test_a_process_that_dies_is_an_error(self):
         with pytest.raises(EngineError, match="a process died"):
             list(PROCESSES.map_unordered(die_at, [(k, (k, 4)) for k in range(8)]))
-
-
-class TestNothingGlobalStays:
-    def test_the_filter_of_warnings_is_there_while_pools_run_only(self):
-        before = list(warnings.filters)
-        first, second = (Engine(2).map_ordered(abs, [(-1,), (-2,)]) for _ in range(2))
-        assert [next(first), next(second)] == [1, 1]
-        (added,) = [one for one in warnings.filters if one not in before]
-        assert added[1].match("A worker stopped while some jobs were given to the executor")
-        assert list(first) == [2]
-        assert added in warnings.filters  # the second pool still runs
-        assert list(second) == [2]
-        assert warnings.filters == before
-
-    def test_filters_that_the_program_reset_meanwhile_stay_so(self):
-        with warnings.catch_warnings():
-            calls = Engine(2).map_ordered(abs, [(-1,), (-2,)])
-            next(calls)
-            warnings.resetwarnings()
-            assert list(calls) == [2]
-            assert warnings.filters == []

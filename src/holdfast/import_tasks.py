@@ -127,8 +127,6 @@ def import_all(
         # All parts were read without an error: only now do the recordings get their names.
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
-    for recording in imported:
-        recording.document["path"] = out / recording.file_name
     hint = None if task.data_format is None else import_hint(task.data_format)
     return ImportResult(imported, out, hint)
 

@@ -5,14 +5,11 @@ Results do not depend on where or in which order the calls are made.
 
 import os
 import time
-import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import suppress
 from functools import cache, partial
-from threading import Lock, Thread
-from typing import Any, NamedTuple, TypeVar, cast
+from threading import Thread
+from typing import NamedTuple, TypeVar
 
-from holdfast.children import SAFE_PATH_VARIABLE, safe_path
 from holdfast.errors import EngineError, MissingExtra, is_installed
 
 T = TypeVar("T")
@@ -22,9 +19,6 @@ Call = tuple[K, Arguments]
 
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
-
-
-LOKY_WARNING = "A worker stopped while some jobs were given"
 
 
 class Engine(NamedTuple):
@@ -99,73 +93,15 @@ def _in_processes(
     """Make calls with joblib."""
     if not is_installed("joblib"):
         raise MissingExtra("joblib", "train")
-    from joblib import delayed
+    from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
     call_named = delayed(_call_in_worker)
     tasks = (call_named(os.getpid(), function, *call) for call in calls)
     try:
-        with _WITHOUT_WARNING:
-            yield from _start(n_jobs, tasks)
+        yield from Parallel(n_jobs, backend="loky", return_as="generator_unordered")(tasks)
     except TerminatedWorkerError as cause:
         raise EngineError("a process died, killed or out of memory; try with fewer jobs") from cause
-
-
-class _WarningFilter:
-    """Filter that ignores the warning of loky about a worker that it replaces.
-
-    loky replaces a worker whose memory grew; no result is lost. The filter is there while any
-    pool runs. Several pools may run at a time and end in any order, so that restoring a list of
-    filters, as `warnings.catch_warnings` does, would lose filters that were added meanwhile.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._n_users = 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._n_users += 1
-            if self._n_users == 1:
-                warnings.filterwarnings("ignore", LOKY_WARNING)
-                self._filter = warnings.filters[0]
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._n_users -= 1
-            if not self._n_users:
-                with suppress(ValueError):  # the program has reset the filters
-                    cast(list[object], warnings.filters).remove(self._filter)
-
-
-_WITHOUT_WARNING = _WarningFilter()
-
-
-def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:
-    """Start the processes and the first tasks; return the iterator over the results."""
-    from joblib import Parallel
-
-    # The processes start with the first tasks, which the call of the generator sends.
-    with safe_path:
-        results: Iterator[Any] = Parallel(
-            n_jobs, backend=_backend_type()(), return_as="generator_unordered"
-        )(tasks)
-    return results
-
-
-@cache
-def _backend_type() -> type[Any]:
-    """Return the back end of joblib, whose later processes have a safe path as well.
-
-    joblib starts a new process in place of one whose memory grew, from a thread of its own. Such
-    a process has the values that some variables had when the pool was started.
-    """
-    from joblib.parallel import LokyBackend
-
-    class SafeBackend(LokyBackend):
-        MAX_NUM_THREADS_VARS = (*LokyBackend.MAX_NUM_THREADS_VARS, SAFE_PATH_VARIABLE)
-
-    return SafeBackend
 
 
 def _call_in_worker(

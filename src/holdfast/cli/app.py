@@ -10,6 +10,7 @@ import keyword
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
@@ -118,6 +119,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         0 after success, 2 after bad input, 130 after an interrupt, 1 after an internal error.
     """
+    if arguments is None:  # this process is ours
+        # Processes that joblib starts would import from the working folder first.
+        os.environ.setdefault("PYTHONSAFEPATH", "1")
+        # joblib replaces a process whose memory grew, and loses no result.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         # Imports alone take seconds on a slow disk, before a verb can print anything.
