@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from hashlib import sha256
@@ -195,21 +194,6 @@ def _keys(tasks: Sequence[Task]) -> dict[str, str]:
     return keys
 
 
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Make NumPy and the C kernel use one thread.
-
-    Workers would compete for processors otherwise, and a sum over several threads is rounded
-    differently.
-    """
-    from threadpoolctl import threadpool_limits
-
-    from holdfast.kernel.batch import thread_limit
-
-    with threadpool_limits(1), thread_limit(1):
-        yield
-
-
 def _call(
     source: str, name: str, function: Callable[..., Any], arguments: tuple[Any, ...]
 ) -> tuple[bytes, float]:
@@ -217,11 +201,14 @@ def _call(
 
     The worker must have the same source.
     """
+    from threadpoolctl import threadpool_limits
+
     start = time.process_time()
     try:
         if source != source_digest():
             raise EngineError("the version of holdfast of its worker differs from this one")
-        with one_thread():
+        # A sum over several threads is rounded differently.
+        with threadpool_limits(1):
             data = msgpack.encode(function(*arguments), enc_hook=_to_builtin)
             return data, time.process_time() - start
     except Exception as failure:

@@ -25,7 +25,7 @@ from holdfast.contact import (
     Phase,
 )
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs, without_short_runs
-from holdfast.recordings import Label, Recording, Truth, cut_labels, labels_from_samples
+from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.sensors.types import Array
 
 Onsets = Literal["truth", "labels", "rule", "mixed"]
@@ -141,24 +141,6 @@ def labels_from_truth(
     states = [rules[k][1] for k in first.tolist()]
     period = float(np.median(np.diff(times)))
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
-
-
-def relabel(recording: Recording, rule: LabelRule) -> Recording:
-    """Return the recording with labels made from its truth.
-
-    Fingers without a truth keep their labels. Labels are cut to the samples: a sensor may start
-    later than the truth.
-
-    Args:
-        recording: to label.
-        rule: thresholds and margins.
-    """
-    labels = labels_by_truth(recording, rule)
-    modules = {
-        name: replace(module, labels=cut_labels(labels[name], module)) if name in labels else module
-        for name, module in recording.modules.items()
-    }
-    return replace(recording, modules=modules) if labels else recording
 
 
 def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[Label, ...]]:

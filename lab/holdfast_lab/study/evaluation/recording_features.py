@@ -22,8 +22,8 @@ from holdfast.metrics.slip_truth import (
     slip_truth,
     truth_without,
 )
-from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Truth, label_states
+from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
+from holdfast.recordings import Recording, Truth, cut_labels, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.kept import WORKER_MEMORY
@@ -229,3 +229,21 @@ def prepared_recordings(corpus: Corpus) -> Iterator[PreparedRecording]:
         prepare = partial(PreparedRecording.of, recording, tare, fingers)
         key = (*corpus.identity, recording.name, fingers, corpus.tare)
         yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
+
+
+def relabel(recording: Recording, rule: LabelRule) -> Recording:
+    """Return the recording with labels made from its truth.
+
+    Fingers without a truth keep their labels. Labels are cut to the samples: a sensor may start
+    later than the truth.
+
+    Args:
+        recording: to label.
+        rule: thresholds and margins.
+    """
+    labels = labels_by_truth(recording, rule)
+    modules = {
+        name: replace(module, labels=cut_labels(labels[name], module)) if name in labels else module
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules) if labels else recording

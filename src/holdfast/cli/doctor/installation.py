@@ -15,8 +15,8 @@ from holdfast.errors import (
     other_project,
     package_versions,
 )
+from holdfast.kernel.batch import usable_processors
 from holdfast.removed import REMOVED
-from holdfast.threads import usable_processors
 
 
 def installation() -> dict[str, Any]:
