@@ -35,7 +35,7 @@ _SHIFT = np.uint64(8 * (8 - PACKED_BYTES))
 def module_blocks(readings: npt.NDArray[np.generic]) -> Digests:
     """Return the digests of the blocks of one module that count, in order of time.
 
-    The number type does not count. A block that occurs twice is that of a periodic signal, and is
+    The number type does not count. A block that occurs twice belongs to a periodic signal, and is
     left out.
 
     Args:

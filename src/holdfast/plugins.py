@@ -66,7 +66,7 @@ class PluginGroup(Generic[T]):
         return tuple(point.name for point, refusal in self._points() if not refusal)
 
     def text(self) -> str:
-        """Return the names for the end of a message, and those of packages that are missing."""
+        """Return the end of a message: names of plug-ins, and names of missing packages."""
         names = self.names()
         missing = [
             f"{name} ({package})"

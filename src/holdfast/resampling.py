@@ -18,7 +18,7 @@ TOLERANCE_PERIODS = 1e-3
 moves no sample."""
 
 RATE_TOLERANCE = 0.2
-"""A rate that differs by at most this share from that of a model is taken as it is."""
+"""A rate that differs from the model's by at most this share is taken as it is."""
 MIN_ROWS_PER_UPDATE = 1.5
 """Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
 EVEN_SHARE = 0.95
@@ -136,7 +136,7 @@ def true_updates(recording: Recording) -> Recording:
     """Return the recording with the true updates of its sensors, if all of them hold samples.
 
     A sensor that updates at 50 Hz in rows of 200 Hz repeats each reading four times. The rows
-    between are no samples: features of them would be those of a slower motion with pauses. A slow
+    between are no samples: in their features the motion would be slower, with pauses. A slow
     sensor, under 30 Hz, gets its true updates also beside sensors that do not hold their samples.
 
     Returns:

@@ -88,7 +88,7 @@ EPILOG = (
 )
 SETTINGS_FILE, SETTINGS_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
 SETTINGS_VERBS = ("detect", "serve", "record", "calibrate")
-"""Verbs that read this file in 0.3.0, as did those of other packages with a source."""
+"""Verbs that read this file in 0.3.0; verbs of other packages with a source did so too."""
 COMPLETE_VARIABLE = "_HOLDFAST_COMPLETE"
 """Is set by the completion script of a shell."""
 
@@ -114,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a verb, and return the exit code of the process.
 
     Args:
-        arguments: words after `holdfast`; by default those of the process.
+        arguments: words after `holdfast`; by default the arguments of the process.
 
     Returns:
         0 after success, 2 after bad input, 130 after an interrupt, 1 after an internal error.

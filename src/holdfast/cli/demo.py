@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
 DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
-"""Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
+"""Objects of the demo, with the cases and grasps of each; `DEMO_MODEL` was trained on others."""
 
 REPLAY_SPEED = 2.0
 """Speed of the replay in the terminal, as a multiple of `--speed`: 26 s of a grasp are long."""

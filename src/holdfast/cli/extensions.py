@@ -106,7 +106,7 @@ PLUGIN_GROUPS = {
 def plugin_states() -> list[Plugin]:
     """Return the plug-ins of other packages, and why some of them are skipped.
 
-    Each is imported, except those of a kind that was removed.
+    Each is imported, except plug-ins of a kind that was removed.
     """
     groups: list[PluginGroup[Any]] = [
         getattr(import_module(module), name)

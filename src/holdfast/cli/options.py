@@ -40,7 +40,7 @@ PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
 class RatePolicy(StrEnum):
-    """What to do with a source whose rate is not within 20 % of the model's."""
+    """Whether a source is resampled or refused if its rate is not within 20 % of the model's."""
 
     RESAMPLE = "resample"
     STRICT = "strict"
@@ -280,7 +280,7 @@ class ServerOptions:
         if token is not None and file is not None:
             raise ValueError("--token and --token-file given; only one of them expected")
         if file is None:
-            # What is typed wins over what the shell has set some time ago.
+            # An option that is typed outranks a variable of the shell.
             return os.environ.get(TOKEN_VARIABLE) if token is None else token
         try:
             if not file.is_file():

@@ -223,7 +223,7 @@ def _plain(name: str) -> str:
 def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     """Yield the names of fingers, reasons, faults and no cause as enumerations.
 
-    The kernel has those of states and causes.
+    The kernel's header has the codes of states and causes.
     """
     first = np.cumsum([0, *(sensor.n_taxels for sensor in sensors.values())]).tolist()
     # Names that are the same in capitals, or without signs, give way to numbers.

@@ -177,7 +177,7 @@ class Detector:
         if in_contact is not None:
             start = replace(self._plan.start, loaded=in_contact)
             self._plan = replace(self._plan, start=start)
-            # Which head decides about slips depends on the start; thresholds that were set stay.
+            # The start decides which slip head is used; thresholds that were set stay.
             thresholds = dict(enumerate(stable_thresholds(self._rules)))
             self._settings, rules, self._weights = self._model.config(self._plan)
             self._rules = with_thresholds(rules, thresholds)

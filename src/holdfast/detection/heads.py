@@ -416,7 +416,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         features = self.features
         check_limit("features of a finger", len(features), MAX_FEATURES)
         check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
-        # The load is that of relative features, which the six of the paper do not have.
+        # Only relative features have a load; the six features of the paper are not relative.
         if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
@@ -455,18 +455,18 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def features(self) -> tuple[FeatureSpec, ...]:
-        """Features of all heads: those of `stable` in their order, then others of the rest."""
+        """Features of all heads: first those of `stable`, then further ones of other heads."""
         # By the name of the head: a model file may list them in any order.
         ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
         return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
 
     def indices(self, head: Head) -> Integers:
-        """Return the indices of the features of a head in those of the finger."""
+        """Return the index of each feature of a head in the list of the finger's features."""
         features = self.features
         return np.array([features.index(spec) for spec in head.features], dtype=np.int64)
 
     def with_heads(self, *heads: Head) -> "FingerModel":
-        """Return the model with some heads in place of those of the same names, or beside them."""
+        """Return the model with heads added; they replace heads of the same names."""
         by_name = {head.name: head for head in (*self.heads, *heads)}
         return msgspec.structs.replace(self, heads=tuple(by_name.values()))
 

@@ -323,7 +323,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     if head is None:
         return np.zeros((0, 1)), np.zeros((0, 0)), []
     columns = part.indices(head)
-    # A head reads the features up to the last that it uses; those of slips read all.
+    # A head reads the features up to the last that it uses; slip heads read all.
     is_slip = head.name in ("slip", "slip_speed", "slip_changes")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
     # A row is the intercept, then a weight for each feature: 0 for those that it does not use.

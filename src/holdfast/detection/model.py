@@ -475,7 +475,7 @@ def _shipped(name: str) -> Model:
 def _noise_floor() -> Model:
     """Return a model without training: stable while sigma is under three times the noise.
 
-    The noise is that of the tare. At the noise itself the probability is 0.9, at nine times the
+    The noise is measured in the tare. At the noise itself the probability is 0.9, at nine times the
     noise it is 0.1.
     """
     slope = 2.0

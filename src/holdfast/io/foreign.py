@@ -1,7 +1,7 @@
 """Files of other programs, read in a child process with one limit of memory and time.
 
-What reads them can abort (h5py, pyarrow), hang, or take all memory for a file that is damaged or
-made by an attacker. The child ends then, and this process has one line.
+The libraries that read them can abort (h5py, pyarrow), hang, or take all memory for a file that
+is damaged or made by an attacker. The child ends then, and this process has one line.
 One child reads all files of an import, one at a time: while nothing is read, it waits.
 
 Requests and answers are lines of JSON on its pipes. Values come in a file of a private folder:
@@ -365,7 +365,7 @@ def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]
 
     name = str(request.options["format"])
     source = importer(name)
-    # Before the limit: the memory of libraries is not that of the file.
+    # Before the limit: it is for the file, not for the libraries.
     for module in EXTRA_MODULES.get(extra_of(name) or "", ()):
         import_module(module)
     _limit_memory(request)

@@ -301,7 +301,7 @@ def _read_group(
         arrays: dict[str, TimedArray] = {}
         times: Array = np.empty(0)
         for spec in specs:
-            # Columns have the order of the arrays; those of truth share the times of the first.
+            # Columns have the order of the arrays; all of the truth share the times of the first.
             if spec.track != "truth" or spec.topic == TRUTH_TIME:
                 column = next(columns)
                 # Nulls are only after the last sample of the module in this span.

@@ -188,7 +188,7 @@ class ChangeLines:
         lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
             for estimate in estimates:
-                # The reason at the change, not that of the sample at which it has lasted.
+                # The reason at the change itself; later the state has lasted, and has another one.
                 if self._why.get(finger, (None,))[0] is not estimate.state:
                     self._why[finger] = estimate.state, why(estimate)
                 for event in self._changes.update({finger: estimate.state}, estimate.time):

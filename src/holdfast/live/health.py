@@ -23,7 +23,7 @@ TOUCH_TO_NOISE = 20.0
 FIELD_TO_NOISE = 5.0
 """A common field counts from this many times the noise on."""
 ROUNDING_NOISE = {"count": 0.3, "N": 1e-6}
-"""Noise below which a taxel is not compared: that of rounding [unit of the readings]."""
+"""Noise of rounding, below which a taxel is not compared [unit of the readings]."""
 MIN_CHECKED_SAMPLES = 20
 """Samples of a module from which on its health is known."""
 ARRIVAL_TIMEOUT, EXTRA_SECONDS = 0.2, 5.0

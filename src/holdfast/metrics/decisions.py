@@ -27,7 +27,7 @@ class FingerDecisions:
         labels: (n,) codes of the labelled states; UNKNOWN without a label.
         states: (n,) codes of the decided states.
         stable_probability: (n,) probability that the contact is stable; NaN if the state is
-            UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
+            UNKNOWN. All NaN for a hand: its state follows from the states of its fingers.
         exact_labels: (n,) codes of the states by the truth, or by a rule without its margin; None
             if neither is known. Events are found in them, because a person draws labels with a
             margin around a disturbance.
@@ -86,7 +86,7 @@ class Decisions:
 
     @classmethod
     def of(cls, name: str, fingers: Mapping[str, FingerDecisions], n_model_fingers: int) -> Self:
-        """Return the decisions of a recording; those of the hand follow from the fingers."""
+        """Return the decisions about the fingers and the hand of a recording."""
         return cls(name, fingers, hand_decisions(fingers, n_model_fingers))
 
     @property

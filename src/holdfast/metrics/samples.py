@@ -17,7 +17,7 @@ from holdfast.sensors.types import Array, Integers
 N_CALIBRATION_BINS = 10
 """Number of bins of probabilities from 0 to 1."""
 MAX_LOG_ODDS = 40.0
-"""Log odds at the first and the last bin; those of float64 end at 37."""
+"""Log odds at the first and the last bin; log odds of float64 end at 37."""
 BINS_PER_UNIT = 50
 """Number of bins for each unit of the log odds."""
 N_BINS = int(2 * MAX_LOG_ODDS * BINS_PER_UNIT) + 1

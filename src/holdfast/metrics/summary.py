@@ -277,7 +277,7 @@ class ResultTotal:
                 total.bin()
 
     def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
-        """Compute the metrics; the arguments are those of `summarise`."""
+        """Compute the metrics; for the arguments see `summarise`."""
         curves = [group.slips.as_curve for group in self.groups] if self.slips else []
         slips = slip_intervals(curves, n=n_resamples, seed=seed)
         return Metrics(

@@ -123,7 +123,7 @@ def labels_from_truth(
     lost = was_held & ~np.logical_or.accumulate(phase == Phase.RELEASED) & free
     # The first rule that applies decides. Instability outranks loss of contact: a finger that is
     # thrown off the object for a moment is disturbed. Contact outranks the phases that follow: a
-    # finger that does not touch has no state of its own. The last one is what is left.
+    # finger that does not touch has no state of its own. The last rule takes all other samples.
     unstable_by = ContactState.UNSTABLE
     rules = (
         (unstable & sliding, (unstable_by, Cause.SLIP)),

@@ -45,8 +45,8 @@ class SeriesStyle(NamedTuple):
 def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name, in the order of first appearance.
 
-    Eighteen styles differ in colour, marker or dashes; then they repeat. The paper's series has
-    its own style, which does not shift those of the others.
+    Eighteen styles differ in colour, marker or dashes; then they repeat. The paper's series has a
+    style of its own; the other series keep theirs.
     """
     styles: dict[str, SeriesStyle] = {}
     others = [name for name in dict.fromkeys(names) if name != PAPER]
@@ -89,7 +89,7 @@ def page_figure(height: float, width: float = PAGE_WIDTH) -> PageFigure:
 
     Args:
         height: of the figure [inch].
-        width: of the figure [inch]; by default that of a page.
+        width: of the figure [inch]; by default the width of a page.
     """
     return PageFigure(figsize=(width, height), dpi=200, layout="constrained")
 

@@ -287,7 +287,7 @@ def combine_decisions(
 ) -> Decisions:
     """Combine the decisions of several models about one recording.
 
-    The decision about a sample is that of the model whose index is the unit of the sample.
+    A sample is decided by the model whose index is the unit of the sample.
 
     Args:
         decisions: of each model, about the same recording.

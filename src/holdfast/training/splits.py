@@ -69,7 +69,7 @@ class DataSplit:
         return np.full(n_samples, self.group_of[index])
 
     def recordings_without(self, left_out: Collection[int]) -> list[int]:
-        """Return the indices of the recordings of which not all samples are in held units."""
+        """Return the indices of the recordings that have samples outside the held units."""
         if self.split in ("time", "random"):
             return list(range(len(self.group_of)))
         return [index for index, unit in enumerate(self.group_of) if unit not in left_out]

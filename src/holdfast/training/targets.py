@@ -126,7 +126,7 @@ def slip_target(target: TargetInput, features: Array) -> TargetSamples:
     usable = finite_rows(features, slides | is_still)
     quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if target.is_any else QUIET_STEP)]
     disturbed = usable[(is_still & ~truth.quiet)[usable]][::step]
-    # What slides is not thinned: it is rare.
+    # Samples that slide are not thinned: they are rare.
     rows = np.sort(np.concatenate([usable[slides[usable]], quiet, disturbed]))
     return target.samples(features, slides, rows, len(usable))
 
@@ -155,7 +155,7 @@ def speed_target(target: TargetInput, features: Array) -> TargetSamples | None:
 def cause_target(target: TargetInput, features: Array) -> TargetSamples | None:
     """Return the unstable samples whose cause is known, as codes.
 
-    Causes are those of the truth, where the recording has one, else those of the labels. What
+    Causes come from the truth, where the recording has one, else from the labels. What
     slides is left out: the head `slip` decides about it.
 
     Args:

@@ -105,7 +105,7 @@ def train(
 
     Args:
         recordings: labelled; may be a lazy dataset.
-        setting: of the training; by default that of the paper's deployed model.
+        setting: of the training; by default the paper's deployed model has it.
         warn: is called with the text of every warning.
         progress: iterates over recordings, choices and fits.
         n_jobs: number of processes on this machine; -1 for one per processor.
@@ -303,8 +303,8 @@ class _Trainer:
         """Score predictions out of fold.
 
         Args:
-            chosen: parameters of every finger from each choice. Unit k uses those of choice k
-                modulo the number of choices.
+            chosen: parameters of every finger from each choice. Unit k uses the parameters of
+                choice k modulo the number of choices.
         """
         n_units = len(self.data.data_split.units)
         n_fits = min(n_units, MAX_FITS)

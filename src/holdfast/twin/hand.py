@@ -39,7 +39,7 @@ ARMATURE, DAMPING, FRICTION = 6e-4, 0.012, 0.012
 choices: small gear motors that can be turned back by hand."""
 PALM_MASS, PALM_SIDES, PALM_MIDDLE = 0.4154, (0.0408, 0.113, 0.095), (-0.0093, 0.0, -0.0475)
 """Mass [kg], sides and middle [m] of the palm. The vendor's table has the centre of mass outside
-the box of the palm; here it is in its middle. All inertias are those of the boxes, because the
+the box of the palm; here it is in its middle. All inertias are computed from the boxes, because the
 vendor's are not physical."""
 TIP_MASS = 0.0266
 """Mass of the skin [kg], from XELA; it replaces a rubber tip of 16.8 g."""

@@ -194,7 +194,7 @@ class Simulation:
         lag = plant.motor_time * RATE
         # Share of the way to a command that a force goes in a sample: 1 without a lag.
         self._motor_part = -math.expm1(-1.0 / lag) if lag > 0 else 1.0
-        self._forces = np.ones(len(FINGERS))  # scales that act, behind those of the commands
+        self._forces = np.ones(len(FINGERS))  # scales that act, behind the scales of the commands
         self._slip_events = SlipEvents(self.plan.slip_events, grasp.item, 1 / RATE)
         self._arm_tremor = draw_tremor(grasp.generator("arm"))
         self._truth_log = TruthLog(FINGERS)
@@ -285,7 +285,7 @@ class Simulation:
         )
 
     def followed(self, scales: Array) -> Array:
-        """Return the scales that act, which follow those of the commands as the motors do."""
+        """Return the scales that act; they follow the scales of the commands as the motors do."""
         if self._motor_part < 1.0:
             self._forces = self._forces + self._motor_part * (scales - self._forces)
             return self._forces

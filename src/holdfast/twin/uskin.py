@@ -129,7 +129,7 @@ class Uskin(FingertipSkin):
         """Start a run of the sensor from rest, which takes samples in chunks of any size.
 
         Args:
-            generator: generator of noise and warming; by default that of the sensor.
+            generator: generator of noise and warming; by default the sensor's.
         """
         return Readout(self.parameters, self.taxels, generator or self._generator)
 

@@ -19,7 +19,7 @@ from holdfast.twin.steps import read_out
 class UskinParameters:
     """Parameters of the model of a uSkin fingertip.
 
-    Nothing is published on the curved fingertip. "Data sheet" is that of the flat uSPa46 (July
+    Nothing is published on the curved fingertip. "Data sheet" means that of the flat uSPa46 (July
     2025, high sensitivity). "Packets" are two packets of whole Allegro hands, 368 taxels each.
 
     Attributes:

@@ -251,7 +251,7 @@ class _Instant(NamedTuple):
 
 
 class _PacketTime(NamedTuple):
-    """Times of a packet: its own stamp, that on the source's clock, and that of its arrival."""
+    """Times of a packet: its stamp, the same moment on the source's clock, and its arrival."""
 
     time: float
     stamp: Stamp

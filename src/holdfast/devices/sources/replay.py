@@ -145,7 +145,7 @@ class Player(Source):
         self._next: TimedSamples | None = None  # the item that `_peek` has read
         self._continues = False
         self._number = 0
-        # From the times of the recording to those of the source, which go on from one recording to
+        # From times of the recording to times of the source, which go on from one recording to
         # the next; and the time of the last samples of the source.
         self._shift = 0.0
         self._last = math.nan

@@ -36,7 +36,7 @@ BOARD = 1
 class PortSource(DeviceSource):
     """Source of a device at a serial port, which has no clock.
 
-    The time of a sample follows from that of its arrival, on the host's monotonic clock (see
+    The time of a sample follows from its arrival, on the host's monotonic clock (see
     `ArrivalClock`). A subclass has the decoder of the bytes.
 
     Attributes:

@@ -230,7 +230,7 @@ def takes_sensors(name: str) -> bool:
 
 
 def import_hint(name: str) -> str | None:
-    """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
+    """Return the hint of a format, from `HINTS` or from its plug-in; None without one."""
     hint: str | None = HINTS.get(name) or getattr(importer(name), "HINT", None)
     return hint
 

@@ -171,7 +171,7 @@ def _of_dataset(
     *,
     is_transposed: bool,
 ) -> dict[str, StoredArray]:
-    """Return the array of a dataset, or those of its fields; none of other values."""
+    """Return the arrays of a dataset: one, or one for each field; none if it holds no numbers."""
     import h5py
 
     shape = tuple(reversed(dataset.shape or ())) if is_transposed else dataset.shape

@@ -21,7 +21,7 @@ FINGER = re.compile(
     r"skin|sensor|module|board|hand|[lr]f?|[fmlr]f|th)?[\W_]*\d*[\W_]*",
     re.IGNORECASE,
 )
-"""What names of fingers say; other words that differ may be other quantities."""
+"""Words of names that mean fingers; other words that differ may mean other quantities."""
 OTHER_QUANTITIES = {
     "accelerometer": ("acc", "accel", "accelerometer", "acceleration", "imu"),
     "gyroscope": ("gyr", "gyro", "gyroscope", "angular"),

@@ -246,7 +246,7 @@ class _Reader:
         return {str(k): rows[a:b] for k, (a, b) in parts} if starts else {"": rows}
 
     def _times(self, track: Track, first: Rows, n: int) -> Array:
-        """Return the times of all rows [s], by those of the first module."""
+        """Return the times of all rows [s]; the first module has them."""
         name = self._time_name(track, first)
         if name is None:
             return np.arange(n) / (self._columns.rate or 1.0)

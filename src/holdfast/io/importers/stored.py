@@ -107,7 +107,7 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
 
 
 def joined_axes(columns: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays with those of x, y and z of one name as one array, the axis last.
+    """Return the arrays; x, y and z of one name are joined to one array, the axis last.
 
     Example:
         >>> joined_axes({axis: np.zeros(4) for axis in ("fx", "fy", "fz")})["f"].shape

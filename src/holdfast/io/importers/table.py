@@ -338,7 +338,7 @@ class CsvFormat(NamedTuple):
     """Format of CSV files that are recognised by their header.
 
     Attributes:
-        is_header: whether the names of the columns are those of the format.
+        is_header: whether the columns have the names of the format.
         expected: message about a folder without such a file, with `{}` for its path.
         every_file: whether all CSV files of a folder are read, also those with another header.
     """

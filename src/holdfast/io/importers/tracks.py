@@ -215,7 +215,7 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
     """Return the columns of each module by their names.
 
     Raises:
-        RecordingError: no names are those of taxels.
+        RecordingError: no name means a taxel.
     """
     n_taxels = {skin.n_taxels for skin in layout.sensors.values()}
     groups = of_names.named_groups(names, n_taxels)

@@ -209,7 +209,7 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
 
 
 MAX_RATE_RATIO = 5.0
-"""Ratio of the rate of a module and that of its sensor from which on it is unlikely."""
+"""A rate of a module is unlikely from this multiple of its sensor's rate on."""
 MIN_CLOCK_DIFFERENCE = 1e-3
 """Smallest relative difference of the clocks of two modules that is reported."""
 MAX_GAPS_SHOWN = 2

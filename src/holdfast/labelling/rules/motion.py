@@ -183,7 +183,7 @@ def clock_offset(seen: Array, felt: Array, is_seen: Mask, period: float) -> Cloc
 def _slope_noise(values: Array, step: float) -> Array:
     """Return (k,) standard deviations of the slope from pose noise alone.
 
-    Smooth motion adds little to second differences, and the median is that of the calmer half.
+    Smooth motion adds little to second differences, and the median ignores the livelier half.
     """
     if len(values) < 3:
         return np.zeros(values.shape[1])

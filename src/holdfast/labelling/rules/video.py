@@ -289,7 +289,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         before = np.median(rest[max(first - n_rest, 0) : first + 1], axis=0)
         after = np.median(rest[last - 1 : last - 1 + n_rest], axis=0)
         away = np.linalg.norm(after - before)
-        # What is fitted as stuck must not reach into the slip before.
+        # The stretch that is fitted as stuck must not reach into the slip before.
         start, free = max(first - round(rule.before / step), free), last - n
         if away < max(1e3 * rule.slid, 6 * noise):
             continue  # a part of a longer motion that came back by itself: nothing slid

@@ -79,7 +79,7 @@ class TipMotion(NamedTuple):
 
 
 def regular_grid(times: Array) -> Array:
-    """Return times one usual step apart, over those of the pictures [s]."""
+    """Return times one usual step apart, over the duration of the pictures [s]."""
     step = float(np.median(np.diff(times)))
     return np.asarray(times[0] + step * np.arange(int((times[-1] - times[0]) / step) + 1))
 

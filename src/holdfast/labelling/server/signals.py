@@ -201,7 +201,7 @@ def signal_values(
 ) -> npt.NDArray[np.floating]:
     """Return (n, n_series) force and sigma of every sample [unit of the readings].
 
-    The baseline is subtracted from all samples, including those of the tare. Unknown values are
+    The baseline is subtracted from all samples, also during the tare. Unknown values are
     NaN.
 
     Args:

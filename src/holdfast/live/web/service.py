@@ -223,7 +223,7 @@ class LiveService:
         return await _answer(work)
 
     async def set_threshold(self, request: web.Request) -> web.Response:
-        """Set the threshold of a POST; a DELETE restores that of the model."""
+        """Set the threshold of a POST; at a DELETE, restore the threshold of the model."""
         value: float | None = None
         notice = "threshold of the model restored"
         if request.method == "POST":

@@ -91,7 +91,7 @@ class Adapted:
 
         Raises:
             TrainingError: the samples have only one class.
-            ValueError: the number of features is not that of the prior.
+            ValueError: the prior has another number of features.
         """
         del seed
         if samples.features.shape[1] != self.prior.n_features:

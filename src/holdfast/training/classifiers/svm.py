@@ -138,7 +138,7 @@ def fit_svm(
 
 
 class _System:
-    """Newton's equations at a point, reduced to those of the weights.
+    """Newton's equations at a point, reduced to the equations of the weights.
 
     Args:
         columns: (n_features + 1, n) vectors z_i.
