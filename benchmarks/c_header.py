@@ -33,7 +33,7 @@ from holdfast.detection import (  # noqa: E402
     Model,
     parse_features,
 )
-from holdfast.detection.c_header import code_size, header_of  # noqa: E402
+from holdfast.detection.c_header import header_of  # noqa: E402
 from holdfast.sensors import sensor  # noqa: E402
 
 FINGERS = ("thumb", "index", "middle", "ring")
@@ -94,10 +94,16 @@ def symbols(text: str) -> str:
         words = ["-std=c99", "-O2", "-fno-pic", "-DHOLDFAST_API=extern", "-x", "c", "-c", "model.h"]
         subprocess.run(["cc", *words, "-o", "model.o"], check=True, cwd=folder)
         done = subprocess.run(["nm", "model.o"], check=True, capture_output=True, cwd=folder)
+        size = subprocess.run(
+            ["size", "-A", "model.o"], check=True, capture_output=True, cwd=folder
+        )
     listed = [line.split()[-2:] for line in done.stdout.decode().splitlines()]
     outside = [name for kind, name in listed if kind == "U" and not name.startswith("_")]
     changing = [name for kind, name in listed if kind in "BbDdC"]
-    return f"calls {', '.join(outside)}; data that can change: {', '.join(changing) or 'none'}"
+    sections = [line.split() for line in size.stdout.decode().splitlines()]
+    code = sum(int(words[1]) for words in sections if words and words[0].startswith(".text"))
+    data = ", ".join(changing) or "none"
+    return f"code {code} bytes; calls {', '.join(outside)}; data that can change: {data}"
 
 
 def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
@@ -108,7 +114,7 @@ def programs(folder: Path, hand) -> dict[tuple[str, str], Path]:
             header = header_of(model, hand, RATE, single=single)
             kind = "float" if single else "double"
             print(f"{name}, {kind}: state {header.state_size}, constants {header.constants_size}, "
-                  f"code {code_size(header)} bytes; {symbols(header.text)}")  # fmt: skip
+                  f"{symbols(header.text)}")  # fmt: skip
             for compiler in filter(shutil.which, ("gcc", "clang")):
                 build = folder / f"{name.split(':')[-1]}-{kind}-{compiler}"
                 build.mkdir()
@@ -129,20 +135,20 @@ def measure(n_updates: int, hand) -> None:
     with TemporaryDirectory() as folder:
         made = programs(Path(folder), hand)
         detectors = {name: Detector(model, hand) for name, model in models().items()}
-        found: dict[tuple[str, str], list[float]] = {key: [] for key in made}
-        found |= {(name, "Detector.update"): [] for name in detectors}
+        costs: dict[tuple[str, str], list[float]] = {key: [] for key in made}
+        costs |= {(name, "Detector.update"): [] for name in detectors}
         n_blocks = n_updates // BLOCK // N_ROUNDS
         for part in range(N_ROUNDS):
             for key, program in made.items():
                 out = subprocess.run([program, str(n_blocks)], check=True, capture_output=True)
-                found[key] += map(float, out.stdout.split())
+                costs[key] += map(float, out.stdout.split())
             for name, detector in detectors.items():
                 for k in range(part * n_blocks * 10, (part + 1) * n_blocks * 10):
                     start = time.perf_counter()
                     detector.update(samples[k % 256], k / RATE)
-                    found[name, "Detector.update"].append(time.perf_counter() - start)
+                    costs[name, "Detector.update"].append(time.perf_counter() - start)
     print(f"load of the machine {os.getloadavg()[0]:.1f}, {os.cpu_count()} processors")
-    for (name, kind), values in sorted(found.items()):
+    for (name, kind), values in sorted(costs.items()):
         low, middle, high = 1e6 * np.percentile(values, [5, 50, 99])
         print(f"{name:13} {kind:18} p5 {low:6.2f}  p50 {middle:6.2f}  p99 {high:8.2f} us"
               f"  (goal in C {BARS[name]})")  # fmt: skip
@@ -153,8 +159,8 @@ def fuzz(n_samples: int, hand) -> None:
     for name, model in models().items():
         python, c = both(model, hand, RATE)
         n = n_samples // len(BARS)
-        for given, when in random_samples(np.random.default_rng(0), hand, RATE, n):
-            compare(python, c, given, when)
+        for readings, when in random_samples(np.random.default_rng(0), hand, RATE, n):
+            compare(python, c, readings, when)
         print(f"{name}: {n} random samples are equal")
 
 

@@ -162,7 +162,7 @@ def sockets(folder):
     with server("play", first(folder), "--port", 0, "--once", cwd=folder) as address:
         with connect(address.replace("xela://", "ws://")) as socket:
             packets = [json.loads(socket.recv(10)) for _ in range(N_PACKETS)]
-        yield "play", digest(json.dumps(sorted({key for one in packets for key in one})))
+        yield "play", digest(json.dumps(sorted({key for x in packets for key in x})))
     with server(
         "serve", "builtin:any", first(folder), "--port", 0, "--once", cwd=folder
     ) as address:
@@ -172,7 +172,7 @@ def sockets(folder):
         with connect(f"{address.replace('http', 'ws')}/api/v1/estimates") as socket:
             socket.recv(10)
             seen = [json.loads(socket.recv(10)) for _ in range(N_ESTIMATES)]
-        yield "serve/estimates", digest(json.dumps(sorted({key for one in seen for key in one})))
+        yield "serve/estimates", digest(json.dumps(sorted({key for x in seen for key in x})))
 
 
 def studies(folder):
@@ -272,11 +272,11 @@ def main():
             for name, value in PARTS[part](folder):
                 made[name] = value[:DIGEST_LENGTH]
                 print(name, made[name], file=sys.stderr, flush=True)
-    known = json.loads(options.path.read_text()) if options.path.exists() else {}
+    kept = json.loads(options.path.read_text()) if options.path.exists() else {}
     if options.action == "write":
-        options.path.write_text(json.dumps(known | made, indent=1, sort_keys=True) + "\n")
+        options.path.write_text(json.dumps(kept | made, indent=1, sort_keys=True) + "\n")
         return 0
-    differ = sorted(name for name in made if known.get(name) != made[name])
+    differ = sorted(name for name in made if kept.get(name) != made[name])
     print(f"{len(made) - len(differ)} of {len(made)} digests are equal")
     print("".join(f"differs: {name}\n" for name in differ), end="")
     return int(bool(differ))

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from holdfast.live.module_checks import HoldDrift, ModuleComparison
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -28,7 +29,6 @@ from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Fault
 from holdfast.detection import FingerTrace, Model, detect
 from holdfast.io import load_recording
 from holdfast.io.importers import import_recordings
-from holdfast.live.module_checks import HoldDrift, ModuleComparison
 from holdfast.plots import COLOURS
 from holdfast.plots.style import (
     FONT_SIZE,
@@ -73,7 +73,7 @@ def traces(modules: Mapping[str, Tactile]) -> tuple[FingerTrace, FingerTrace]:
     """Return the estimates of the first module without the rules of magnetometers, and with."""
     model, name = Model.load("builtin:any"), next(iter(modules))
     others = {name: without_rules(module) for name, module in modules.items()}
-    before, after = (detect(model, Recording("made", own)).fingers for own in (others, modules))
+    before, after = (detect(model, Recording("made", skins)).fingers for skins in (others, modules))
     return before[name], after[name]
 
 
@@ -141,12 +141,12 @@ def draw_notice(axes: Axes, modules: Mapping[str, Values], notice: str) -> None:
 
 def likeness_of(modules: Mapping[str, Values]) -> str:
     comparison, n = ModuleComparison(), len(next(iter(modules.values())))
-    found = [
-        f"{each.module} {each.text}"
+    alike = [
+        f"{x.module} {x.text}"
         for k in range(0, n, 5)
-        for each in comparison.update({name: own[k] for name, own in modules.items()}, k / RATE)
+        for x in comparison.update({name: rows[k] for name, rows in modules.items()}, k / RATE)
     ]
-    return found[0]
+    return alike[0]
 
 
 def notices() -> dict[str, tuple[dict[str, Values], str]]:
@@ -226,8 +226,8 @@ LAWS = (Fault.REPEATED, Fault.EQUAL_TAXELS, Fault.STUCK, Fault.COPIED)
 
 def recordings_of(folder: Path) -> Iterator[Recording]:
     """Yield our recordings of a folder, or those of other programs."""
-    own = sorted(folder.glob("*.parquet"))
-    yield from map(load_recording, own) if own else import_recordings(folder)
+    paths = sorted(folder.glob("*.parquet"))
+    yield from map(load_recording, paths) if paths else import_recordings(folder)
 
 
 def release(recording: Recording, finger: str) -> float:
@@ -247,7 +247,7 @@ def print_healthy(folders: Sequence[Path]) -> None:
     """
     rows: dict[tuple[str, str], Values] = {}
     model = Model.load("builtin:any")
-    for recording in (each for folder in folders for each in recordings_of(folder)):
+    for recording in (path for folder in folders for path in recordings_of(folder)):
         profile = str(recording.metadata.get("profile", "real"))
         for name, trace in detect(model, recording).fingers.items():
             bits = [trace.faults >> list(Fault).index(law) & 1 for law in LAWS]
@@ -317,10 +317,10 @@ def print_broken(recordings: Sequence[Recording], start: float) -> None:
             made = Recording("made", {name: replace(module, readings=values)})
             trace = detect(model, made).fingers[name]
             bits = [trace.faults >> list(Fault).index(x) & 1 for x in (law, Fault.INVALID)]
-            found = k + np.flatnonzero(max(bits, key=lambda bit: bit[k:].sum())[k:])
+            first = k + np.flatnonzero(max(bits, key=lambda bit: bit[k:].sum())[k:])
             row = "- | - | - | -"
-            if len(found):
-                at = found[0]
+            if len(first):
+                at = first[0]
                 after, without = (100 * (x.state[at:] == STABLE).mean() for x in (trace, clean))
                 seconds = trace.times[at] - trace.times[k]
                 row = f"{at - k} | {seconds:.2f} | {after:.0f} | {without:.0f}"

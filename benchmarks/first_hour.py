@@ -3,7 +3,7 @@
     uv run python benchmarks/first_hour.py
 
 Eight tasks of at most three commands. Each command stands in README or in `--help`, or was proposed
-by the command before it: `PASTE` is the line that it printed. first_run.py times the set-up.
+by the command before it: `PASTE` is the line that it printed.
 """
 
 import os

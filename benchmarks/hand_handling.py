@@ -21,7 +21,7 @@ from holdfast.training.own_handling import grasped_samples
 MAX_RATE = 20.0
 """Samples per second that are kept of each recording [Hz]; neighbours are nearly copies."""
 NORMALISED_BY = "others", "itself", "default"
-"""What the features of a grasp may be normalised by."""
+"""Kinds of handling by which the features of a grasp are normalised."""
 ONSET_DURATION = 0.2
 """Time after a stable sample in which an unstable one shows the onset of instability [s]."""
 MIN_SAMPLES = 100
@@ -147,7 +147,7 @@ def moments_by(name: str, grasps: Sequence[HandGrasp]) -> list[Moments | None]:
     if name == "itself":
         return [location_and_scale(x.handling) if len(x.handling) else None for x in grasps]
     default = default_handling(grasps)
-    return [None if own is None else default for own in others]
+    return [None if moments is None else default for moments in others]
 
 
 def folds_of(grasps: Sequence[HandGrasp], n_folds: int) -> np.ndarray:

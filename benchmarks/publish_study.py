@@ -72,10 +72,10 @@ class Figures:
         Raises:
             LookupError: no row, or several rows, meet the condition.
         """
-        found = self.rows(table, where)
-        if len(found) != 1:
-            raise LookupError(f"{table}: one row expected for {dict(where)}, {len(found)} found")
-        number = found[0][field]
+        rows = self.rows(table, where)
+        if len(rows) != 1:
+            raise LookupError(f"{table}: one row expected for {dict(where)}, {len(rows)} found")
+        number = rows[0][field]
         return None if number is None else float(number)
 
     def cell(
@@ -147,16 +147,16 @@ class Figures:
             intervals: columns with their interval; all by default.
             shown: values of keys whose rows are shown, in the order of the rows; all by default.
         """
-        found = [
+        body = [
             row
             for row in self.rows(table, where)
             if all(row.get(key) in values for key, values in (shown or {}).items())
         ]
-        if not found:
+        if not body:
             return f"(The run has no rows for this table: {table}.)"
-        names = list(columns) or list(dict.fromkeys(str(row[column]) for row in found))
+        names = list(columns) or list(dict.fromkeys(str(row[column]) for row in body))
         cells: dict[tuple[str, ...], dict[str, str]] = {}
-        for row in found:
+        for row in body:
             head = tuple(str(row.get(key, "")) for key in lines)
             name = str(row[column])
             n_digits = (digits_of or {}).get(name, digits)
@@ -164,10 +164,10 @@ class Figures:
             cells.setdefault(head, {}).setdefault(name, _cell_text(kept, n_digits))
         table_lines = [[*lines, *names], ["---"] * len(lines) + ["--:"] * len(names)]
         table_lines += [
-            [*head, *(by_column.get(each, MISSING) for each in names)]
+            [*head, *(by_column.get(cell, MISSING) for cell in names)]
             for head, by_column in cells.items()
         ]
-        return "\n".join(f"| {' | '.join(map(_escape, each))} |" for each in table_lines)
+        return "\n".join(f"| {' | '.join(map(_escape, cell))} |" for cell in table_lines)
 
 
 def number_text(value: float | None, digits: int) -> str:
@@ -296,9 +296,9 @@ def main() -> None:
     command.add_argument("run", type=Path)
     command.add_argument("--real", type=Path)
     commands.add_parser("render")
-    given = parser.parse_args()
-    if given.command == "publish":
-        publish(given.run, DOCS, given.real)
+    options = parser.parse_args()
+    if options.command == "publish":
+        publish(options.run, DOCS, options.real)
     write_pages(DOCS)
 
 

@@ -137,8 +137,8 @@ def _rounded(value: object) -> object:
     if isinstance(value, float):
         return float(f"{value:.{DIGITS}g}")
     if isinstance(value, dict):
-        return {name: _rounded(each) for name, each in value.items()}
-    return [_rounded(each) for each in value] if isinstance(value, list) else value
+        return {name: _rounded(item) for name, item in value.items()}
+    return [_rounded(item) for item in value] if isinstance(value, list) else value
 
 
 def main() -> None:
@@ -152,11 +152,11 @@ def main() -> None:
     verb.add_argument("hard", type=Path)
     commands.add_parser("sets").add_argument("runs", nargs="+", metavar="NAME FOLDER")
     commands.add_parser("render")
-    given = parser.parse_args()
-    if given.command == "publish":
-        publish(given.run, DOCS, given.hard)
-    elif given.command == "sets":
-        publish_sets(DOCS, dict(zip(given.runs[::2], map(Path, given.runs[1::2]), strict=True)))
+    options = parser.parse_args()
+    if options.command == "publish":
+        publish(options.run, DOCS, options.hard)
+    elif options.command == "sets":
+        publish_sets(DOCS, dict(zip(options.runs[::2], map(Path, options.runs[1::2]), strict=True)))
     write_page(DOCS)
 
 

@@ -148,7 +148,9 @@ def read_all(folders: Sequence[Path], cache: Path) -> list[FingerSamples]:
             kept = cache / f"{folder.name}-{path.stem}.pickle"
             if not kept.exists():
                 kept.write_bytes(pickle.dumps(read(path, model)))
-            own = pickle.loads(kept.read_bytes())
+            kept_samples = pickle.loads(kept.read_bytes())
             # Folders of two seeds have hands of the same numbers.
-            samples += [replace(one, hand=f"{folder.name}/{one.hand}") for one in own]
+            samples += [
+                replace(sample, hand=f"{folder.name}/{sample.hand}") for sample in kept_samples
+            ]
     return samples

@@ -119,10 +119,10 @@ def training_samples(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return normalised features and whether they are stable, of the grasps with own handling."""
     values, stable = [], []
-    for grasp, own in zip(grasps, moments, strict=True):
-        if own is not None:
+    for grasp, moment in zip(grasps, moments, strict=True):
+        if moment is not None:
             used = is_used(grasp)
-            values.append(grasp.normalised(own).features[used])
+            values.append(grasp.normalised(moment).features[used])
             stable.append(is_stable(grasp)[used])
     return np.concatenate(values), np.concatenate(stable)
 
@@ -150,13 +150,13 @@ def report(
         The metrics by name, and the threshold.
     """
     parts = zip(*out_of_fold(grasps, moments, folds, handling), strict=True)
-    own, default, stable = (np.concatenate(part) for part in parts)
-    names, values = ("auc", "auc_default"), (own, default)
+    handled, default, stable = (np.concatenate(part) for part in parts)
+    names, values = ("auc", "auc_default"), (handled, default)
     figures = {name: float(roc_auc_score(stable, p)) for name, p in zip(names, values, strict=True)}
     threshold = float(np.quantile(default[stable], 1 - STABLE_SHARE))
-    found = float((default[~stable] < threshold).mean())
+    share = float((default[~stable] < threshold).mean())
     print(
-        f"| {title} | {figures['auc']:.3f} | {figures['auc_default']:.3f} | {found:.2f} |",
+        f"| {title} | {figures['auc']:.3f} | {figures['auc_default']:.3f} | {share:.2f} |",
         flush=True,
     )
     return figures, threshold
@@ -171,11 +171,11 @@ def out_of_fold(
         classifier = fit([grasps[k] for k in training], [moments[k] for k in training])
         middle = np.array(classifier.mean), np.array(classifier.scale)
         for k in np.flatnonzero(folds == fold):
-            own, used = handling[k], is_used(grasps[k])
-            if own is None or not used.any():
+            handling_moments, used = handling[k], is_used(grasps[k])
+            if handling_moments is None or not used.any():
                 continue
             # The same classifier with another location and scale.
-            calibrated = grasps[k].normalised(own).features * middle[1] + middle[0]
+            calibrated = grasps[k].normalised(handling_moments).features * middle[1] + middle[0]
             yield (
                 classifier.probability(calibrated[used]),
                 classifier.probability(grasps[k].features[used]),

@@ -83,13 +83,13 @@ def fit(samples: Sequence[FingerSamples], columns: list[int], early: float | Non
         early: time from the onset of a slip whose samples are used [s]; None for all that slides.
     """
     features, slides, weights = [], [], []
-    for own in samples:
-        sliding = own.slides & own.begins(early)
-        used = own.held & (sliding | own.still)
-        is_quiet = own.truth.quiet & ~sliding
+    for hand in samples:
+        sliding = hand.slides & hand.begins(early)
+        used = hand.held & (sliding | hand.still)
+        is_quiet = hand.truth.quiet & ~sliding
         kept = np.flatnonzero(used & ~is_quiet), np.flatnonzero(used & is_quiet)[::QUIET_STEP]
         rows = np.concatenate(kept)
-        features.append(own.features[rows][:, columns])
+        features.append(hand.features[rows][:, columns])
         slides.append(sliding[rows])
         weights.append(np.repeat([1.0, QUIET_STEP], [len(kept[0]), len(kept[1])]))
     x, y, weight = (np.concatenate(parts) for parts in (features, slides, weights))
@@ -111,11 +111,11 @@ def out_of_fold(
     samples: Sequence[FingerSamples], columns: list[int], early: float | None
 ) -> list[Left]:
     """Return the scores of all samples, by rules that are fitted without a fifth of the hands."""
-    hands = {hand: k % N_FOLDS for k, hand in enumerate(sorted({own.hand for own in samples}))}
+    hands = {hand: k % N_FOLDS for k, hand in enumerate(sorted({x.hand for x in samples}))}
     left = []
     for fold in range(N_FOLDS):
-        rule = fit([own for own in samples if hands[own.hand] != fold], columns, early)
-        left += [Left(own, rule.scores(own)) for own in samples if hands[own.hand] == fold]
+        rule = fit([x for x in samples if hands[x.hand] != fold], columns, early)
+        left += [Left(x, rule.scores(x)) for x in samples if hands[x.hand] == fold]
     return left
 
 
@@ -126,25 +126,25 @@ def report(name: str, left: Sequence[Left]) -> float:
     its own handling sets its threshold.
     """
     by_hand: dict[str, list[np.ndarray]] = {}
-    for own, scores in left:
-        by_hand.setdefault(own.hand, []).append(scores[own.held & own.still])
+    for x, scores in left:
+        by_hand.setdefault(x.hand, []).append(scores[x.held & x.still])
     shifts = {
         hand: np.quantile(np.concatenate(parts), 1 - RAISED)
         for hand, parts in by_hand.items()
         if sum(map(len, parts)) > 1 / RAISED
     }
     counts, slides, ranks = [], [], []
-    for own, scores in left:
-        if own.hand not in shifts:
+    for x, scores in left:
+        if x.hand not in shifts:
             continue
-        shifted = scores - shifts[own.hand]
-        probability = np.where(own.held, 1 / (1 + np.exp(-shifted)), 0.0)
+        shifted = scores - shifts[x.hand]
+        probability = np.where(x.held, 1 / (1 + np.exp(-shifted)), 0.0)
         raised = np.zeros(len(probability), bool)
-        decisions = SlipDecisions(own.times, probability, raised, SLIP_HOLD_TIME, own.truth)
+        decisions = SlipDecisions(x.times, probability, raised, SLIP_HOLD_TIME, x.truth)
         counter = SlipCounter.of(decisions)
         counts.append(counter.count(decisions.raised_at(1 / (1 + np.exp(-LOG_ODDS[::2])))))
-        used = own.held & (own.slides | own.still)
-        slides.append(own.slides[used])
+        used = x.held & (x.slides | x.still)
+        slides.append(x.slides[used])
         ranks.append(shifted[used])
     total = SlipCounts.total(counts)
     metrics = [slip_metrics(total[k]) for k in range(len(total))]
@@ -162,9 +162,9 @@ def report(name: str, left: Sequence[Left]) -> float:
 def highest_scores(left: Sequence[Left]) -> np.ndarray:
     """Return the highest score of each slip over 1 mm before it has slid 1 mm."""
     highest = []
-    for own, scores in left:
-        for slip in own.truth.slips:
-            inside = (own.times >= slip.onset - EARLIEST) & (own.times <= slip.reached[0])
+    for hand, scores in left:
+        for slip in hand.truth.slips:
+            inside = (hand.times >= slip.onset - EARLIEST) & (hand.times <= slip.reached[0])
             if np.isfinite(slip.reached[0]) and np.isfinite(scores[inside]).any():
                 highest.append(float(np.nanmax(scores[inside])))
     return np.array(highest)
@@ -194,15 +194,15 @@ def main(options: argparse.Namespace) -> None:
         return
     heads, figures = [], {}
     for name, (specs, early) in chosen.items():
-        own, columns = begun[name], columns_of(specs)
-        left = out_of_fold(own, columns, early)
-        hands, slips = len({s.hand for s in own}), sum(len(s.truth.slips) for s in own)
+        parts, columns = begun[name], columns_of(specs)
+        left = out_of_fold(parts, columns, early)
+        hands, slips = len({s.hand for s in parts}), sum(len(s.truth.slips) for s in parts)
         text = f"{name}: {hands} hands, {slips} slips, {len(specs)} features"
         figures[f"auc_{name}"] = report(text, left)
         scores = np.quantile(highest_scores(left), np.linspace(0, 1, N_QUANTILES))
         heads.append(
             Head(
-                name=name, link="logit", features=specs, rule=fit(own, columns, early).linear,
+                name=name, link="logit", features=specs, rule=fit(parts, columns, early).linear,
                 threshold=1.0, smoothing=SLIP_SMOOTHING, hold=SLIP_HOLD_TIME,
                 slip_scores=tuple(scores.round(3).tolist()),
             )
@@ -237,8 +237,8 @@ def save(model: Model, heads: Sequence[Head], figures: dict[str, float], out: Pa
     part = model.finger("*").without_heads("slip").with_heads(*heads)
     changed = msgspec.structs.replace(model, fingers={"*": part}, name=out.stem)
     if model.training is not None:
-        known = model.training.figures | figures
-        training = msgspec.structs.replace(model.training, figures=known)
+        before = model.training.figures | figures
+        training = msgspec.structs.replace(model.training, figures=before)
         changed = msgspec.structs.replace(changed, training=training)
     changed.save(out, force=True)
     print(f"{out} written")

@@ -102,7 +102,7 @@ def print_confusion(model: Model, samples: Sequence[UnstableSamples], folds: Int
     """Print the estimated causes of single samples of folds left out, in percent of a row."""
     counts = np.zeros((len(CAUSES), len(CAUSES)), dtype=np.int64)
     for fold in range(N_FOLDS):
-        others = [sample for sample, own in zip(samples, folds, strict=True) if own != fold]
+        others = [sample for sample, fold_of in zip(samples, folds, strict=True) if fold_of != fold]
         head = fit(model, others)
         weights, names = head.rule.raw_weights(), np.array(head.classes)
         for k in np.flatnonzero(folds == fold):
@@ -120,8 +120,8 @@ def save(model: Model, head: Head, recordings: Sequence[Recording], out: Path) -
     """Write the model; its provenance names the recordings of the head, too."""
     training = model.training
     if training is not None:
-        known = set(training.recordings.values())
-        added = {item.name: item.digest for item in recordings if item.digest not in known}
+        digests = set(training.recordings.values())
+        added = {item.name: item.digest for item in recordings if item.digest not in digests}
         training = msgspec.structs.replace(training, recordings=training.recordings | added)
     changed = model.changed(lambda part: part.with_heads(head))
     msgspec.structs.replace(changed, training=training, name=out.stem).save(out, force=True)

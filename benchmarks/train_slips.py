@@ -98,7 +98,7 @@ def add_speed(model: Model, options: argparse.Namespace, engine: Engine) -> None
         )
     print(f"{samples.n_positive} sliding samples of slips over 1 mm")
     if options.out is not None:
-        complete = model.changed(lambda own: own.with_heads(head))
+        complete = model.changed(lambda finger_model: finger_model.with_heads(head))
         msgspec.structs.replace(complete, name=options.out.stem).save(options.out, force=True)
         print(f"{options.out} written")
 
@@ -159,13 +159,13 @@ def print_folder(
     index: int,
 ) -> None:
     """Print the metrics out of fold of the recordings of one folder, at the chosen threshold."""
-    own = [
+    paths = [
         SlipCounts.total(fingers.values())
         for item, fingers in zip(recordings, curves, strict=True)
         if fingers and item.name.startswith(f"{folder}/")
     ]
     print(folder)
-    print_metrics(slip_metrics(SlipCounts.total(own)[index]))
+    print_metrics(slip_metrics(SlipCounts.total(paths)[index]))
 
 
 def curves_of(model: Model, recording: Recording) -> Mapping[str, SlipCounts]:
@@ -180,8 +180,8 @@ def save(model: Model, recordings: Sequence[Recording], out: Path) -> None:
     """Write the model; its provenance names the recordings of the head of slips, too."""
     training = model.training
     if training is not None:
-        known = set(training.recordings.values())
-        added = {item.name: item.digest for item in recordings if item.digest not in known}
+        known_digests = set(training.recordings.values())
+        added = {item.name: item.digest for item in recordings if item.digest not in known_digests}
         digests = training.recordings | added
         training = msgspec.structs.replace(training, recordings=digests)
     msgspec.structs.replace(model, training=training, name=out.stem).save(out, force=True)

@@ -4,14 +4,11 @@ import json
 import os
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
-from threading import Barrier
 
 import pytest
 
-from holdfast.children import SAFE_PATH_VARIABLE, python_command, safe_path
+from holdfast.children import python_command
 from holdfast.io import save_recording
-from holdfast.parallel import Engine
 from holdfast.synthetic import synthetic_recording
 from holdfast_grip.loop.watchdog import N_SAFE_COMMANDS
 
@@ -78,7 +75,7 @@ def run(tmp_path):
 
     def run(*words, program=COMMAND):
         (scripts / "program.py").write_text(program)
-        environment = {k: v for k, v in os.environ.items() if k != SAFE_PATH_VARIABLE}
+        environment = {k: v for k, v in os.environ.items() if k != "PYTHONSAFEPATH"}
         done = subprocess.run(
             [sys.executable, str(scripts / "program.py"), *map(str, words)],
             cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
@@ -129,35 +126,3 @@ def test_a_child_finds_the_modules_of_its_parent(monkeypatch, tmp_path):
     program = "import beside, json; print(json.dumps([beside.NAME, sys.argv[1:], sys.path]))"
     done = subprocess.run(python_command(program, "a", "b"), stdout=subprocess.PIPE, check=True)
     assert json.loads(done.stdout) == ["beside", ["a", "b"], sys.path]
-
-
-def has_safe_path(number):
-    del number
-    return sys.flags.safe_path, os.environ.get(SAFE_PATH_VARIABLE)
-
-
-def test_workers_have_a_safe_path_and_this_process_keeps_its_environment():
-    before = os.environ.get(SAFE_PATH_VARIABLE)
-    assert set(Engine(2).map_ordered(has_safe_path, ((k,) for k in range(4)))) == {(True, "1")}
-    assert os.environ.get(SAFE_PATH_VARIABLE) == before
-
-
-@pytest.mark.parametrize("before", [None, "", "1"])
-def test_the_environment_is_restored_by_the_last_thread(monkeypatch, before):
-    monkeypatch.delenv(SAFE_PATH_VARIABLE, raising=False)
-    if before is not None:
-        monkeypatch.setenv(SAFE_PATH_VARIABLE, before)
-    barrier = Barrier(4)
-
-    def enter():
-        with safe_path:
-            barrier.wait()
-            assert os.environ[SAFE_PATH_VARIABLE] == "1"
-            with safe_path:
-                pass
-            assert os.environ[SAFE_PATH_VARIABLE] == "1"
-
-    with ThreadPoolExecutor(4) as threads:
-        for done in [threads.submit(enter) for _ in range(4)]:
-            done.result()
-    assert os.environ.get(SAFE_PATH_VARIABLE) == before

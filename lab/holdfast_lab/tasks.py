@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 from msgspec import UNSET, MsgspecError, Raw, Struct, UnsetType, msgpack
 
-from holdfast.cluster import one_thread
 from holdfast.errors import EngineError, OutputError
 from holdfast.files import write_whole
 from holdfast.parallel import Engine
@@ -202,11 +201,14 @@ def _call(
 
     The worker must have the same source.
     """
+    from threadpoolctl import threadpool_limits
+
     start = time.process_time()
     try:
         if source != source_digest():
             raise EngineError("the version of holdfast of its worker differs from this one")
-        with one_thread():
+        # A sum over several threads is rounded differently.
+        with threadpool_limits(1):
             data = msgpack.encode(function(*arguments), enc_hook=_to_builtin)
             return data, time.process_time() - start
     except Exception as failure:

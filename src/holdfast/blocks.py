@@ -16,7 +16,7 @@ Digests = npt.NDArray[np.uint64]
 BLOCK_CHANGES = 32
 """Number of changes of a block, a power of two. A noisy skin changes at every sample."""
 BLOCK_STRIDE = 32
-"""Number of successive blocks of which one counts: any 64 changes contain one that does."""
+"""One of so many successive blocks counts: any 64 changes contain one that does."""
 MIN_DIFFERENT = 16
 """Least number of different readings of a block that counts. A module at rest that toggles between
 a few readings has fewer; two recordings of it may be alike by chance."""
@@ -35,7 +35,7 @@ _SHIFT = np.uint64(8 * (8 - PACKED_BYTES))
 def module_blocks(readings: npt.NDArray[np.generic]) -> Digests:
     """Return the digests of the blocks of one module that count, in order of time.
 
-    The number type does not count. A block that occurs twice is that of a periodic signal, and is
+    The number type does not count. A block that occurs twice belongs to a periodic signal, and is
     left out.
 
     Args:

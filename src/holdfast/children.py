@@ -4,17 +4,7 @@
 recordings would run in every child process that imports bisect.
 """
 
-import os
 import sys
-from threading import Lock
-from types import TracebackType
-
-SAFE_PATH_VARIABLE = "PYTHONSAFEPATH"
-"""Environment variable that keeps the working folder from the path of Python, as `python -P`."""
-CHILD_TIMEOUT = 60.0
-"""Time in which a child must answer; enough to import a plug-in [s]."""
-ANSWER_PREFIX = "answer of the plug-in: "
-"""Text before an answer: a plug-in may print as well."""
 
 
 def python_command(program: str, *arguments: str) -> list[str]:
@@ -32,69 +22,3 @@ def python_command(program: str, *arguments: str) -> list[str]:
     path = [folder for folder in sys.path if isinstance(folder, str)]
     with_path = f"import sys; sys.path[:] = {path!r}; {program}"
     return [sys.executable, "-P", "-c", with_path, *arguments]
-
-
-def answer_of_child(module: str, function: str, *words: str) -> str:
-    """Return the text that a function gives in a child process, which it may end or block.
-
-    Args:
-        module: name of the module of the function.
-        function: name of the function.
-        words: its arguments.
-    """
-    import subprocess  # not for `--help`
-
-    program = (
-        f"from {module} import {function}\n"
-        f"print({ANSWER_PREFIX!r} + {function}(*sys.argv[1:]), end='')"
-    )
-    try:
-        done = subprocess.run(
-            python_command(program, *words), stdin=subprocess.DEVNULL,
-            capture_output=True, text=True, errors="replace", timeout=CHILD_TIMEOUT, check=False,
-        )  # fmt: skip
-    except subprocess.TimeoutExpired:
-        return f"its import takes longer than {CHILD_TIMEOUT:.0f} s"
-    # The answer comes last, after all that the plug-in prints.
-    _, answered, answer = done.stdout.rpartition(ANSWER_PREFIX)
-    return answer if answered else f"its import ends the process (exit code {done.returncode})"
-
-
-class _SafePath:
-    """Context in which libraries start Python without the working folder on its path.
-
-    They pass their environment on, so the variable is set in this process meanwhile. Several
-    threads may enter; the last one to leave restores the environment.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._n_entered = 0
-        self._before: str | None = None
-
-    def __enter__(self) -> None:
-        with self._lock:
-            # Only the first one: for the others the value is already ours.
-            if not self._n_entered:
-                self._before = os.environ.get(SAFE_PATH_VARIABLE)
-                os.environ[SAFE_PATH_VARIABLE] = "1"
-            self._n_entered += 1
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        with self._lock:
-            self._n_entered -= 1
-            if self._n_entered:
-                return
-            if self._before is None:
-                os.environ.pop(SAFE_PATH_VARIABLE, None)
-            else:
-                os.environ[SAFE_PATH_VARIABLE] = self._before
-
-
-safe_path = _SafePath()
-"""The context of this process."""

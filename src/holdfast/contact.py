@@ -5,7 +5,7 @@ codes. An instant without a label is UNKNOWN, so that labels and decisions can b
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from enum import StrEnum
 from functools import cache, lru_cache
 from numbers import Integral
@@ -161,7 +161,8 @@ class ContactEstimate(msgspec.Struct, frozen=True, gc=False):
     Attributes:
         time: time of the sample, on the clock of the source [s].
         state: UNKNOWN, NO_CONTACT, UNSTABLE or STABLE.
-        reason: why the state is UNKNOWN, or UNSTABLE whatever the probability; else empty.
+        reason: why the state is UNKNOWN, or why it is UNSTABLE although the probability is high;
+            else empty.
         stable_probability: probability that the contact is stable; NaN while UNKNOWN.
         instability: sigma, the standard deviation of the Haar details [unit of the readings];
             NaN without a full window.
@@ -238,80 +239,61 @@ LASTING_DURATION = 0.1
 
 
 class StateChanges:
-    """Memory of several contact states that finds their changes.
+    """Find the changes of the contact states of fingers and of the hand.
 
-    With a minimum duration, it finds only changes that lasted, without flicker: a change is
-    found when the new state has lasted so long, with the time at which it began. A state that
-    returns earlier is no change. This is for people: for control it comes too late. All states
-    begin as UNKNOWN.
+    With a minimum duration, only changes that lasted are found, without flicker: when the new
+    state has lasted so long, with the time at which it began. A state that returns earlier is no
+    change. This is for people: for control it comes too late. All states begin as UNKNOWN.
 
     Args:
-        names: of the fingers, in the order of the states.
         min_duration: minimum time that a new state must last [s].
-
-    Attributes:
-        states: the latest state of each name; the latest that lasted, with a minimum duration.
 
     Raises:
         ValueError: the duration is negative or not finite.
 
     Example:
-        >>> changes = StateChanges(["thumb"])
-        >>> changes.update([ContactState.UNKNOWN], time=0.0)
+        >>> changes = StateChanges()
+        >>> changes.update({"thumb": ContactState.UNKNOWN}, time=0.0)
         []
-        >>> (event,) = changes.update([ContactState.STABLE], time=0.1)
+        >>> (event,) = changes.update({"thumb": ContactState.STABLE}, time=0.1)
         >>> event.finger, event.state.value, event.previous.value, event.time
         ('thumb', 'STABLE', 'UNKNOWN', 0.1)
 
         Only a change that lasted:
 
-        >>> lasting = StateChanges(["thumb"], min_duration=0.2)
-        >>> [len(lasting.update([ContactState.STABLE], time)) for time in (0.0, 0.1, 0.2)]
+        >>> lasting = StateChanges(min_duration=0.2)
+        >>> [len(lasting.update({"thumb": ContactState.STABLE}, t)) for t in (0.0, 0.1, 0.2)]
         [0, 0, 1]
     """
 
-    def __init__(self, names: Sequence[str], min_duration: float = 0.0) -> None:
+    def __init__(self, min_duration: float = 0.0) -> None:
         if not (math.isfinite(min_duration) and min_duration >= 0):
             raise ValueError(f"a duration of at least 0 s expected, {min_duration} given")
-        self._names = tuple(names)
-        self._min_duration = min_duration
-        # `states` are those that were reported; `_newest` the latest of all, and since when, which
-        # may not last.
-        self.states = [ContactState.UNKNOWN] * len(self._names)
-        self._newest = [(ContactState.UNKNOWN, -math.inf)] * len(self._names)
+        self._shortest = min_duration - TIME_TOLERANCE
+        # By name: the state that was reported, and the latest of all, which may not last, with the
+        # time at which it began.
+        self._reported: dict[str, ContactState] = {}
+        self._latest: dict[str, tuple[ContactState, float]] = {}
 
-    def update(self, states: Sequence[ContactState], time: float) -> list[ContactEvent]:
-        """Return the changes from the previous states to `states` at one sample.
+    def update(self, states: Mapping[str, ContactState], time: float) -> list[ContactEvent]:
+        """Return the changes to `states` at one sample.
 
         Args:
-            states: one for each name.
-            time: of the sample, not before that of the previous one [s].
+            states: by name.
+            time: of the sample; it does not decrease [s].
         """
-        if self._min_duration:
-            return self._update_lasting(states, time)
-        return [
-            self._change(index, new, time)
-            for index, (new, old) in enumerate(zip(states, self.states, strict=True))
-            if new is not old
-        ]
-
-    def _update_lasting(self, states: Sequence[ContactState], time: float) -> list[ContactEvent]:
-        """Return the changes that have lasted long enough at one sample."""
-        shortest, events = self._min_duration - TIME_TOLERANCE, []
-        for index, (state, lasting) in enumerate(zip(states, self.states, strict=True)):
-            if state is not self._newest[index][0]:
-                self._newest[index] = state, time
-            # The event has the time at which the state began, not that at which it has lasted.
-            begin = self._newest[index][1]
-            if state is not lasting and time - begin >= shortest:
-                events.append(self._change(index, state, begin))
+        events = []
+        for name, state in states.items():
+            latest, begin = self._latest.get(name, (ContactState.UNKNOWN, -math.inf))
+            if state is not latest:
+                begin = time
+                self._latest[name] = state, time
+            previous = self._reported.get(name, ContactState.UNKNOWN)
+            if state is not previous and time - begin >= self._shortest:
+                self._reported[name] = state
+                # The time at which the state began, not that at which it has lasted.
+                events.append(ContactEvent(name, state, previous, begin))
         return events
-
-    def _change(self, index: int, state: ContactState, time: float) -> ContactEvent:
-        """Set one state to another, and return the change."""
-        event = ContactEvent(self._names[index], state, self.states[index], time)
-        self.states[index] = state
-        return event
 
 
 MIN_HOLDING_FINGERS = 2
@@ -339,30 +321,10 @@ def hand_state(codes: npt.NDArray[np.integer[Any]], n_model_fingers: int, n_dead
         >>> hand_state(np.array([STABLE, STABLE, NO_CONTACT], dtype=np.int8), 3) == STABLE
         True
     """
-    # UNSTABLE comes first: a finger that slips must not be hidden by one that is UNKNOWN.
-    n_stable = 0
-    n_unknown = 0
-    for code in codes:
-        if code == UNSTABLE:
-            return UNSTABLE
-        n_unknown += code == UNKNOWN
-        n_stable += code == STABLE
-    if n_unknown > 0 or (n_dead and not len(codes)):
-        return UNKNOWN
+    unknown = UNKNOWN in codes or (n_dead > 0 and not len(codes))
     n_able = 1 if n_dead and len(codes) == 1 else n_model_fingers
-    return STABLE if n_stable >= min(MIN_HOLDING_FINGERS, n_able) else NO_CONTACT
-
-
-# By the rule itself, so that it stands once: 4 unstable + 2 unknown + held is the index.
-_HAND_STATES = np.array(
-    [
-        hand_state(np.array([UNSTABLE] * unstable + [UNKNOWN] * unknown + [STABLE] * held), 1)
-        for unstable in (False, True)
-        for unknown in (False, True)
-        for held in (False, True)
-    ],
-    dtype=np.int8,
-)
+    held = enough_contacts(np.sum(codes == STABLE), n_able)
+    return int(hand_states(*np.array([[UNSTABLE in codes], [unknown], [held]]))[0])
 
 
 def hand_states(
@@ -384,7 +346,9 @@ def hand_states(
         >>> hand_states(calm, calm, held).tolist() == [NO_CONTACT, STABLE]
         True
     """
-    return np.asarray(_HAND_STATES[4 * unstable + 2 * unknown + held])
+    # UNSTABLE comes first: a finger that slips must not be hidden by one that is UNKNOWN.
+    order = [unstable, unknown, held]
+    return np.select(order, [UNSTABLE, UNKNOWN, STABLE], NO_CONTACT).astype(np.int8)
 
 
 def enough_contacts(

@@ -6,7 +6,7 @@
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      a detector cannot process the samples
     ├── SourceError      a source cannot be reached, sends nothing, or is not the expected one
-    ├── EngineError      the processes or the cluster that make parallel calls fail
+    ├── EngineError      the processes that make parallel calls fail
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     an optional package is not installed
 
@@ -33,7 +33,6 @@ EXTRA_MODULES = {
     "plot": ("matplotlib",),
     "label": ("scipy",),
     "video": ("cv2", "scipy"),
-    "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
 }
@@ -47,7 +46,6 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "video": "holdfast label markers, record --camera, and stickers in videos",
-    "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
@@ -114,7 +112,7 @@ class SourceError(HoldfastError):
 
 
 class EngineError(HoldfastError):
-    """The processes or the cluster of parallel calls fail: repair them, then start again."""
+    """The processes of parallel calls fail: repair what ended them, then start again."""
 
 
 class OutputError(HoldfastError):
@@ -257,7 +255,7 @@ def installed_distributions(name: str) -> "Iterator[Distribution]":
     """
     from importlib.metadata import distributions
 
-    return (found for found in distributions(name=name) if found.read_text("INSTALLER"))
+    return (x for x in distributions(name=name) if x.read_text("INSTALLER"))
 
 
 def other_project() -> str:
@@ -286,7 +284,7 @@ def package_versions() -> dict[str, dict[str, str | None]]:
                 group[match["package"]] = None
     # "all" requires other extras of this package, not packages
     others = (versions.get(extra, {}) for extra in EXTRA_PURPOSES if extra != "all")
-    return versions | {"all": {name: found for group in others for name, found in group.items()}}
+    return versions | {"all": {name: text for group in others for name, text in group.items()}}
 
 
 def listen_error(host: str, port: int, cause: Exception) -> OutputError:

@@ -190,7 +190,7 @@ def read_input(path: str | Path, max_size: int, *, follow: bool = True) -> bytes
 
 
 def _check_mode(path: str | Path, mode: int) -> None:
-    """Raise an error if a mode is not that of a regular file."""
+    """Raise an error if a mode does not belong to a regular file."""
     if stat.S_ISDIR(mode):
         raise IsADirectoryError(errno.EISDIR, "it is a folder; a file expected", str(path))
     if not stat.S_ISREG(mode):

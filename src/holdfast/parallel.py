@@ -1,102 +1,40 @@
-"""Parallel calls: in processes of this machine by joblib, or on a Dask cluster.
+"""Parallel calls, in processes of this machine by joblib.
 
-When a process dies, the calls that were running are made again. Results do not depend on where
-or in which order the calls are made.
+Results do not depend on where or in which order the calls are made.
 """
 
 import os
 import time
-import warnings
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from contextlib import suppress
 from functools import cache, partial
-from pathlib import Path
-from threading import Lock, Thread
-from typing import Any, NamedTuple, Self, TypeVar, cast
+from threading import Thread
+from typing import NamedTuple, TypeVar
 
-from holdfast.children import SAFE_PATH_VARIABLE, safe_path
-from holdfast.cluster import Arguments, Call, call_on_cluster
-from holdfast.errors import EngineError, MissingExtra, OutputError, is_installed
+from holdfast.errors import EngineError, MissingExtra, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
-
-MAX_RETRIES = 2
-"""Number of times that a call whose process died is made again, alone."""
+Arguments = tuple[object, ...]
+Call = tuple[K, Arguments]
 
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
 
 
-LOKY_WARNING = "A worker stopped while some jobs were given"
-
-
 class Engine(NamedTuple):
-    """Where calls are made: this process, processes of this machine, or a Dask cluster.
+    """Where calls are made: in this process, or in processes of this machine.
 
     Attributes:
         n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
-            in this process. On a cluster, its number of threads counts instead.
-        scheduler: address of a Dask scheduler; None for this machine.
+            in this process.
     """
 
     n_jobs: int = 1
-    scheduler: str | None = None
-
-    @classmethod
-    def parse(cls, text: str = "loky", n_jobs: int = -1) -> Self:
-        """Return the engine that a text names.
-
-        Args:
-            text: `loky` for processes of this machine, `dask:ADDRESS` for a cluster.
-            n_jobs: number of calls at a time on this machine.
-
-        Raises:
-            ValueError: the text names no engine.
-
-        Example:
-            >>> Engine.parse("dask:tcp://10.0.0.1:8786").scheduler
-            'tcp://10.0.0.1:8786'
-        """
-        kind, _, address = text.partition(":")
-        if text == "loky":
-            return cls(n_jobs)
-        if kind == "dask" and address:
-            return cls(n_jobs, address)
-        raise ValueError(f"unknown engine {text!r}; there are loky and dask:ADDRESS")
 
     @property
     def in_this_process(self) -> bool:
         """Whether a call is made in this process, when its result is needed."""
-        return self.scheduler is None and self.n_jobs == 1
-
-    def path(self, path: Path) -> Path:
-        """Return a path as all processes can use it: absolute on a cluster.
-
-        A worker has another working folder. Its machine must have the file at the same path.
-        """
-        return path if self.scheduler is None else path.absolute()
-
-    def check_written(self, path: Path) -> None:
-        """Check that a file that a call has written is there.
-
-        Raises:
-            OutputError: a worker of a cluster wrote it to a disk of its own.
-        """
-        if self.scheduler is not None and not path.exists():
-            raise OutputError(
-                f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
-                "that all machines have at the same path"
-            )
-
-    def check(self) -> None:
-        """Make one call, so that an engine that cannot be reached is found before the work.
-
-        Raises:
-            EngineError, MissingExtra: as `map_unordered`.
-        """
-        if self.scheduler is not None:
-            list(self.map_ordered(abs, [(0,)]))
+        return self.n_jobs == 1
 
     def map_ordered(
         self,
@@ -133,22 +71,18 @@ class Engine(NamedTuple):
         Args:
             function: any function that can be sent to another process.
             calls: the name of each call and its arguments. All names differ.
-            shared: first arguments of every call. A cluster copies them to each worker once.
+            shared: first arguments of every call.
 
         Yields:
             The name of a call and its result.
 
         Raises:
-            EngineError: the cluster cannot be reached, has no workers or a worker without this
-                version of holdfast, or the process died every time that one call was made.
-                The text names that call.
-            MissingExtra: joblib or dask is not installed.
+            EngineError: a process died.
+            MissingExtra: joblib is not installed.
         """
-        if self.scheduler is not None:
-            return call_on_cluster(function, calls, self.scheduler, shared)
         if shared:
             function = partial(function, *shared)
-        if self.n_jobs != 1:
+        if not self.in_this_process:
             return _in_processes(function, calls, self.n_jobs)
         return ((name, function(*arguments)) for name, arguments in calls)
 
@@ -156,95 +90,18 @@ class Engine(NamedTuple):
 def _in_processes(
     function: Callable[..., T], calls: Iterable[Call[K]], n_jobs: int
 ) -> Iterator[tuple[K, T]]:
-    """Make calls with joblib.
-
-    A process that dies breaks the whole pool. Then each call that was running is made again
-    alone, and the other calls in a new pool.
-    """
+    """Make calls with joblib."""
     if not is_installed("joblib"):
         raise MissingExtra("joblib", "train")
-    from joblib import delayed
+    from joblib import Parallel, delayed
     from joblib.externals.loky.process_executor import TerminatedWorkerError
 
-    # `started` has the calls that joblib took and whose result has not come: `_record` adds, the
-    # loop removes. What is left in it when the pool breaks may have killed a process.
-    rest, started = iter(calls), dict[K, Arguments]()
-    ended = False
-    while started or not ended:
-        # Alone first, then the rest: a call that kills its process ends the run at once.
-        for name in list(started):
-            yield name, _call_in_own_process(function, name, started.pop(name))
-        call_named = delayed(_call_in_worker)
-        tasks = (call_named(os.getpid(), function, *call) for call in _record(rest, started))
-        with suppress(TerminatedWorkerError), _WITHOUT_WARNING:
-            for name, result in _start(n_jobs, tasks):
-                del started[name]
-                yield name, result
-            ended = True
-
-
-class _WarningFilter:
-    """Filter that ignores the warning of loky about a worker that it replaces.
-
-    loky replaces a worker whose memory grew; no result is lost. The filter is there while any
-    pool runs. Several pools may run at a time and end in any order, so that restoring a list of
-    filters, as `warnings.catch_warnings` does, would lose filters that were added meanwhile.
-    """
-
-    def __init__(self) -> None:
-        self._lock = Lock()
-        self._n_users = 0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._n_users += 1
-            if self._n_users == 1:
-                warnings.filterwarnings("ignore", LOKY_WARNING)
-                self._filter = warnings.filters[0]
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._n_users -= 1
-            if not self._n_users:
-                with suppress(ValueError):  # the program has reset the filters
-                    cast(list[object], warnings.filters).remove(self._filter)
-
-
-_WITHOUT_WARNING = _WarningFilter()
-
-
-def _start(n_jobs: int, tasks: Iterable[object]) -> Iterator[Any]:
-    """Start the processes and the first tasks; return the iterator over the results."""
-    from joblib import Parallel
-
-    # The processes start with the first tasks, which the call of the generator sends.
-    with safe_path:
-        results: Iterator[Any] = Parallel(
-            n_jobs, backend=_backend_type()(), return_as="generator_unordered"
-        )(tasks)
-    return results
-
-
-@cache
-def _backend_type() -> type[Any]:
-    """Return the back end of joblib, whose later processes have a safe path as well.
-
-    joblib starts a new process in place of one whose memory grew, from a thread of its own. Such
-    a process has the values that some variables had when the pool was started.
-    """
-    from joblib.parallel import LokyBackend
-
-    class SafeBackend(LokyBackend):
-        MAX_NUM_THREADS_VARS = (*LokyBackend.MAX_NUM_THREADS_VARS, SAFE_PATH_VARIABLE)
-
-    return SafeBackend
-
-
-def _record(calls: Iterator[Call[K]], started: dict[K, Arguments]) -> Iterator[Call[K]]:
-    """Yield the calls, each added to `started` before."""
-    for name, arguments in calls:
-        started[name] = arguments
-        yield name, arguments
+    call_named = delayed(_call_in_worker)
+    tasks = (call_named(os.getpid(), function, *call) for call in calls)
+    try:
+        yield from Parallel(n_jobs, backend="loky", return_as="generator_unordered")(tasks)
+    except TerminatedWorkerError as cause:
+        raise EngineError("a process died, killed or out of memory; try with fewer jobs") from cause
 
 
 def _call_in_worker(
@@ -266,20 +123,3 @@ def _end_with(parent: int) -> None:
 
     if os.getpid() != parent:
         Thread(target=wait, name="holdfast-parent", daemon=True).start()
-
-
-def _call_in_own_process(function: Callable[..., T], name: object, arguments: Arguments) -> T:
-    """Make one call in another process; only this call can be the cause if the process dies."""
-    from joblib import delayed
-    from joblib.externals.loky.process_executor import TerminatedWorkerError
-
-    for _ in range(MAX_RETRIES):
-        with suppress(TerminatedWorkerError):
-            # Two jobs, as joblib makes one job in this process.
-            call = delayed(_call_in_worker)(os.getpid(), function, None, arguments)
-            ((_, result),) = _start(2, [call])
-            return cast(T, result)
-    raise EngineError(
-        f"{name}: its process died {1 + MAX_RETRIES} times, killed or out of memory; "
-        "try with fewer jobs"
-    )

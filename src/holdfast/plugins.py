@@ -66,7 +66,7 @@ class PluginGroup(Generic[T]):
         return tuple(point.name for point, refusal in self._points() if not refusal)
 
     def text(self) -> str:
-        """Return the names for the end of a message, and those of packages that are missing."""
+        """Return the end of a message: names of plug-ins, and names of missing packages."""
         names = self.names()
         missing = [
             f"{name} ({package})"
@@ -90,13 +90,13 @@ class PluginGroup(Generic[T]):
             self._report(point, _reason(cause))
             return None
 
-    def require(self, name: str, what: str, known: Iterable[str] = ()) -> T:
+    def require(self, name: str, what: str, names: Iterable[str] = ()) -> T:
         """Return a plug-in.
 
         Args:
             name: of the plug-in.
             what: what the name stands for, as in "the verb hold".
-            known: all names that there are, for the message.
+            names: all names that there are, for the message.
 
         Raises:
             HoldfastError: it is skipped, or its package is not installed.
@@ -113,7 +113,7 @@ class PluginGroup(Generic[T]):
                 "have the reason"
             )
         raise missing_part(self.kind, name, what) or ValueError(
-            f"{what} is unknown; there are {', '.join(known) or 'none'}"
+            f"{what} is unknown; there are {', '.join(names) or 'none'}"
         )
 
     def load_all(self) -> dict[str, T]:
@@ -121,16 +121,16 @@ class PluginGroup(Generic[T]):
         loaded = {name: self.load(name) for name in self.names()}
         return {name: plugin for name, plugin in loaded.items() if plugin is not None}
 
-    def states(self, error: Callable[[str, str], str]) -> list[Plugin]:
+    def states(self, error: Callable[[str], str]) -> list[Plugin]:
         """Return the plug-ins, each with the reason why it is skipped, if it is.
 
         Those of the packages beside the core are no guests: they are left out if they fit.
 
         Args:
-            error: returns that reason for a kind and a name; `doctor` loads them elsewhere.
+            error: returns that reason for a name.
         """
         return [
-            Plugin(self.kind, point.name, _package(point), refusal or error(self.kind, point.name))
+            Plugin(self.kind, point.name, _package(point), refusal or error(point.name))
             for point, refusal in self._points()
             if refusal or not _is_own(point)
         ]
@@ -155,7 +155,7 @@ class PluginGroup(Generic[T]):
         # Of two with one name the first counts, whatever the order of folders on the path.
         points.sort(key=lambda point: (point.name, _package(point)))
         first: dict[str, EntryPoint] = {}
-        found: list[tuple[EntryPoint, str]] = []
+        pairs: list[tuple[EntryPoint, str]] = []
         for point in points:
             owner = _package(first.setdefault(point.name, point))
             if point.name in self._built_in:
@@ -163,10 +163,10 @@ class PluginGroup(Generic[T]):
             elif owner != _package(point):
                 reason = f"{owner} has {point.name} as well; another name expected"
             else:
-                known = point.dist
-                reason = "" if known is None else other_version(known.name, known.version)
-            found.append((point, reason))
-        return found
+                package = point.dist
+                reason = "" if package is None else other_version(package.name, package.version)
+            pairs.append((point, reason))
+        return pairs
 
     def _usable_points(self) -> "dict[str, EntryPoint]":
         """Return the entry points by name; report those whose name is taken."""

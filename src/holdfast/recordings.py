@@ -134,7 +134,7 @@ class Tactile:
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "readings", readings)
         unit = self.unit or sensor.unit
-        if unit != sensor.unit:  # calibrated: range, step and rest are those of raw readings
+        if unit != sensor.unit:  # calibrated: range, step and rest hold for raw readings
             raw = replace(sensor, unit=unit, range=None, step=None, rests_at_zero=False)
             object.__setattr__(self, "sensor", raw)
         object.__setattr__(self, "unit", unit)

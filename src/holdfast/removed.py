@@ -42,6 +42,7 @@ REMOVED: dict[str, dict[str, str]] = {
         "train --resume": "leave it out: train has a grid now, and holdfast study the search",
         "datasets --yes": "leave it out, no set is larger than 26 MB",
         "--config": WRITTEN_OUT,
+        "--engine": "--jobs N, for N processes of this machine",
         "play --hand": "holdfast hold twin:?object=can --hand twin:",
         **dict.fromkeys(
             (
@@ -63,6 +64,12 @@ REMOVED: dict[str, dict[str, str]] = {
         ),
         "hold --min-scale": "none; a law never goes below 0.8 of the first force",
         "study --benchmark": NONE,
+        "doctor --history": NONE,
+        "record --fingers-only": NONE,
+        "simulate --film": "holdfast simulate OUT --video films the stickers",
+        "record --note": "holdfast record SOURCE OUT --set note=TEXT",
+        "detect --raw": NONE,
+        "serve --raw": NONE,
         "serve --ros1": "holdfast serve MODEL SOURCE --ros2, and a ros1_bridge beside it",
     },
     "sources": {

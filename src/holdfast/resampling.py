@@ -18,7 +18,7 @@ TOLERANCE_PERIODS = 1e-3
 moves no sample."""
 
 RATE_TOLERANCE = 0.2
-"""A rate that differs by at most this share from that of a model is taken as it is."""
+"""A rate that differs from the model's by at most this share is taken as it is."""
 MIN_ROWS_PER_UPDATE = 1.5
 """Least number of rows from one change of the readings to the next of a sample-and-hold sensor."""
 EVEN_SHARE = 0.95
@@ -136,7 +136,7 @@ def true_updates(recording: Recording) -> Recording:
     """Return the recording with the true updates of its sensors, if all of them hold samples.
 
     A sensor that updates at 50 Hz in rows of 200 Hz repeats each reading four times. The rows
-    between are no samples: features of them would be those of a slower motion with pauses. A slow
+    between are no samples: in their features the motion would be slower, with pauses. A slow
     sensor, under 30 Hz, gets its true updates also beside sensors that do not hold their samples.
 
     Returns:
@@ -147,11 +147,11 @@ def true_updates(recording: Recording) -> Recording:
         name: held_rows(module.readings[:HELD_ROWS], module.sensor, module.rate)
         for name, module in modules.items()
     }
-    known = [n_rows for n_rows in held.values() if n_rows is not None]
-    every = min(known, default=1.0) > 1.0
+    counted_rows = [n_rows for n_rows in held.values() if n_rows is not None]
+    every = min(counted_rows, default=1.0) > 1.0
     updates = {}
     for name, module in modules.items():
-        n_rows = held[name] or (min(known) if every else 1.0)
+        n_rows = held[name] or (min(counted_rows) if every else 1.0)
         rate = 1 / (n_rows * module.period)
         if n_rows == 1.0 or not (every or rate < MIN_UPDATE_RATE):
             continue
@@ -204,11 +204,13 @@ def resample(recording: Recording, rate: float) -> Recording:
         bounds = [0, *cuts.tolist(), module.n_samples]
         pieces = []
         for first, last in pairwise(bounds):
-            own = module.times[first:last]
+            stretch_times = module.times[first:last]
             values = np.asarray(module.readings[first:last], dtype=np.float64)
-            reached = ((own - own[0] + TOLERANCE_PERIODS / rate) * rate).astype(np.int64)
+            reached = ((stretch_times - stretch_times[0] + TOLERANCE_PERIODS / rate) * rate).astype(
+                np.int64
+            )
             change = _interpolated if rate * module.period >= 1 else _averaged
-            pieces.append(change(own, values, reached, rate))
+            pieces.append(change(stretch_times, values, reached, rate))
         times = np.concatenate([times for times, _ in pieces])
         readings = np.concatenate([readings for _, readings in pieces])
         bare = replace(module, times=times, readings=readings, labels=())

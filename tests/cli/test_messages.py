@@ -41,7 +41,6 @@ MESSAGES = [
     ("detect builtin:any a.parquet --ignore 7", "--ignore", "FINGER:TAXEL", "'7'"),
     ("detect builtin:any a.parquet --ignore index:3,index:31", "index: taxel 31", "1 to 30"),
     ("detect builtin:any a.parquet --debounce=-1", "duration", "-1"),
-    ("detect builtin:any a.parquet --raw --debounce 0", "--raw", "leave out --debounce"),
     ("detect builtin:any a.parquet --seconds 2", "--seconds", "a.parquet"),
     ("detect builtin:any twin: --seconds 0", "--seconds", "0 given"),
     ("detect builtin:any press.csv --sensor skin", "'skin'", "anyskin"),
@@ -85,7 +84,6 @@ MESSAGES = [
     ("import a.parquet kept/deeper", "kept/deeper"),
     ("import press.csv out --columns F", "--columns", "time=COLUMN"),
     ("import a.parquet out --jobs 0", "jobs", "0 given"),
-    ("import a.parquet out --engine spark:x", "'spark:x'", "loky", "dask"),
     ("info none", "none does not exist"),
     ("info nothing", "nothing is empty", "holdfast import"),
     ("info other", "no recording in other (1 other", "holdfast import"),
@@ -168,7 +166,6 @@ MESSAGES = [
     ("simulate new --cases 3", "--cases", "'3'"),
     ("simulate new --repeats 0", "repeats", "0 given"),
     ("simulate new --seed=-1", "seed", "-1 given"),
-    ("simulate new --film film.avi", "film.avi"),
     ("simulate new --faults field=3,rust=1", "--faults", "'rust=1'", "zero-share"),
     ("simulate new --faults drift", "--faults drift", "a number"),
     ("simulate new --faults drift=-1", "drift", "-1"),
@@ -193,9 +190,9 @@ MESSAGES = [
     ("sensors --template 3x3 --pitch 0", "--pitch", "0"),
     ("sensors --template 3x3 --unit kg", "--unit", "'kg'", "N"),
     ("sensors gtac --template 3x3", "--template", "'gtac'"),
-    ("doctor --history x.json", "--history", "SOURCE"),
+    ("doctor --plot x.svg", "--plot", "SOURCE"),
     ("doctor serial:///dev/null?sensor=part.json", "part.json", "'positions'"),
-    ("doctor touched.parquet --history x.json", "index is touched from the start"),
+    ("doctor touched.parquet", "index is touched from the start"),
 ]
 """Words of a command, and what its message must name: what was wrong, or what to type instead."""
 

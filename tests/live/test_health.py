@@ -1,8 +1,7 @@
-"""Health of modules: ten seconds of an open hand, and what is worse than at the last check."""
+"""Health of modules: ten seconds of an open hand."""
 
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -10,13 +9,9 @@ from holdfast import open_source, save_recording
 from holdfast.errors import SourceError
 from holdfast.live.health import (
     HealthCheck,
-    ModuleHealth,
-    changes_since,
     check_health,
-    history_path,
-    keep,
+    findings_of,
     module_health,
-    read_history,
 )
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -36,8 +31,8 @@ def health(readings, which=PATCH, times=TIMES):
     return module_health("index", which, times, readings)
 
 
-def check(day, **modules):
-    return HealthCheck(day, 0, modules)
+def check(**modules):
+    return HealthCheck("2026-11-26", 0, modules)
 
 
 def test_an_open_hand_that_turns():
@@ -46,7 +41,7 @@ def test_an_open_hand_that_turns():
     assert np.allclose(found.noise, 3, rtol=0.15)
     assert (found.dead, found.stuck, found.n_zeros, found.n_gaps) == ([], [], 0, 0)
     assert found.field == pytest.approx(78 / 1.5, rel=0.1)  # from the middle of the readings
-    assert changes_since(check("2026-11-26", index=found), None) == []
+    assert findings_of(check(index=found)) == []
 
 
 def test_faulty_taxels_gaps_and_jitter():
@@ -59,25 +54,11 @@ def test_faulty_taxels_gaps_and_jitter():
     found = health(readings, times=times)
     assert (found.dead, found.stuck, found.n_zeros, found.n_gaps) == ([3], ["5 y"], 20, 1)
     assert found.jitter == pytest.approx(1.4e-3, rel=0.1)
-    assert changes_since(check("2026-11-26", index=found), None) == [
+    assert findings_of(check(index=found)) == [
         "taxel 3 of index is dead",
         "axis y of taxel 5 of index never changes",
         "index reads zeros in one taxel in 2 % of its samples",
     ]
-
-
-def test_a_taxel_that_is_noisier_than_at_the_last_check():
-    before, readings = health(open_hand()), open_hand(1)
-    readings[:, 6] += np.rint(np.random.default_rng(2).normal(0, 15, (1000, 3)))
-    now = check("2026-11-26", index=health(readings))
-    slow = msgspec.structs.replace(before, rate=50.0)
-    last = check("2026-11-12", index=slow, thumb=before)
-    assert changes_since(now, last) == [
-        "index sends 100 Hz, 50 Hz on 12 November",
-        "taxel 7 of index is five times noisier than on 12 November",
-    ]
-    other = check("2026-11-12", index=msgspec.structs.replace(before, sensor="anyskin"))
-    assert changes_since(now, other) == []
 
 
 def test_a_touched_hand_is_refused():
@@ -95,7 +76,7 @@ def test_a_touched_hand_is_refused():
 
 def test_one_taxel_is_said():
     one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
-    (text,) = changes_since(check("2026-11-26", index=health(open_hand()[:, :1], one)), None)
+    (text,) = findings_of(check(index=health(open_hand()[:, :1], one)))
     assert text.startswith("index has one taxel")
 
 
@@ -126,10 +107,8 @@ def test_what_precedes_the_first_touch_is_checked(tmp_path, end):
     before = round(100 * (found.touch[1] - 0.2))
     assert {x.n_samples for x in found.modules.values()} <= {before, before + 1}
     assert found.modules["index"].highest < 33_100
-    (text,) = changes_since(found, None)
+    (text,) = findings_of(found)
     assert text.startswith(f"index was touched at {found.touch[1]} s")
-    keep(tmp_path / "kept.json", [], found)
-    assert read_history(tmp_path / "kept.json") == [found]
 
 
 def test_a_hand_that_is_touched_from_the_start_is_told_so(tmp_path):
@@ -139,17 +118,3 @@ def test_a_hand_that_is_touched_from_the_start_is_told_so(tmp_path):
     for readings, metadata in ((released, {}), (early, {}), (open_hand(), {"starts_loaded": True})):
         with pytest.raises(SourceError, match="is touched from the start: open the hand"):
             checked(tmp_path, {"index": readings}, metadata)
-
-
-def test_checks_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    path = history_path("xela://127.0.0.1:5000")
-    assert path == tmp_path / "holdfast/health/xela_127.0.0.1_5000.json"
-    assert read_history(path) == []
-    first = check("2026-11-12", index=health(open_hand()))
-    keep(path, [first] * 60, first)
-    assert read_history(path) == [first] * 50
-    assert isinstance(read_history(path)[0].modules["index"], ModuleHealth)
-    path.write_text("{")
-    with pytest.raises(SourceError, match=r"xela_127.0.0.1_5000.json is no history of checks: "):
-        read_history(path)

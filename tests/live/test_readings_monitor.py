@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -5,7 +6,7 @@ import pytest
 
 from holdfast import Model
 from holdfast.devices.sources import Arrival
-from holdfast.live.readings_monitor import MISSING_AXES, NO_CHANGE, PULLED, ReadingsMonitor
+from holdfast.live.readings_monitor import MISSING_AXES, PULLED, HoldDrift, ReadingsMonitor
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
@@ -52,9 +53,7 @@ def test_what_never_changes():
     ((text, time),) = notices(readings)
     assert text == "index: " + MISSING_AXES.format("x and y")
     assert time < 3
-    ((text, time),) = notices(np.full((len(TIMES), 16, 3), 1000))
-    assert text == f"index: {NO_CHANGE}"
-    assert time == pytest.approx(10, abs=0.1)
+    assert notices(np.full((len(TIMES), 16, 3), 1000)) == []  # the fault `dead`
 
 
 @pytest.mark.parametrize(("force", "n"), [(1.0, 0), (5.0, 1)])
@@ -107,20 +106,6 @@ def test_a_recording_in_parts_gives_the_same():
     assert found == [f"index: {PULLED}"]
 
 
-def test_two_modules_with_the_same_readings_are_a_notice_once():
-    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
-    found = [
-        notice
-        for sample, time in zip(grasp(), TIMES, strict=True)
-        for name in ("index", "thumb")  # samples may come one by one
-        for notice in monitor.update({name: sample}, time)
-    ]
-    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
-    parts = parts_of(grasp(), "index", "thumb")
-    assert found == [notice for part in parts for notice in monitor.update_recording(part)]
-    assert [text.startswith("thumb has the same readings as index") for text in found] == [True]
-
-
 @pytest.mark.parametrize(
     ("name", "expected"), [("builtin:any", 1), ("builtin:noise-floor", 0)], ids=["first", "seconds"]
 )
@@ -134,3 +119,28 @@ def test_the_live_detector_passes_notices_on(name, expected):
         arrival = Arrival(time=time, samples={"thumb": sample}, received=time)
         passed += detector.update(arrival).arrival.notices
     assert passed == [f"thumb: {PULLED}"] * expected
+
+
+def drift_of(amplitude, times):
+    drift = HoldDrift()
+    for time, value in zip(times, amplitude, strict=True):
+        drift.update(np.array([0.0, 0.0, value]), time)
+    return drift
+
+
+def test_the_drift_of_the_longest_hold():
+    times = np.arange(0, 60, 0.05)
+    drift = drift_of(np.where(times < 15, 400.0, 900 - 0.5 * times), times)
+    assert drift.per_minute == pytest.approx(-30, rel=1e-3)
+    assert (drift.seconds, drift.load) == (44.0, pytest.approx(892, abs=1))
+
+
+@pytest.mark.parametrize(
+    "amplitude",
+    [lambda t: 100 + 0 * t[:150], lambda t: 100 * (1 + np.sin(t))],
+    ids=["short", "moved"],
+)
+def test_without_a_hold_there_is_no_drift(amplitude):
+    times = np.arange(0, 30, 0.05)
+    values = amplitude(times)
+    assert math.isnan(drift_of(values, times[: len(values)]).per_minute)

@@ -23,7 +23,7 @@ from holdfast.synthetic import synthetic_recording
     ],
 )  # fmt: skip
 def test_texts_of_numbers_become_numbers(text, value):
-    pairs = typed_metadata("", "2", "", [f"x={text}"])
+    pairs = typed_metadata("", "2", [f"x={text}"])
     assert pairs == {"case": "2", "x": value}
     assert type(pairs["x"]) is type(value)
 
@@ -34,7 +34,7 @@ def test_texts_of_numbers_become_numbers(text, value):
 )
 def test_settings_of_another_form(settings, name):
     with pytest.raises(ValueError, match=f"^--set.*{name}"):
-        typed_metadata("can", "", "", settings)
+        typed_metadata("can", "", settings)
 
 
 @pytest.mark.parametrize(

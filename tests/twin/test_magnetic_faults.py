@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from holdfast.live.module_checks import ModuleComparison
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin.magnetic_faults import STILL_SECONDS_AT_START, MagneticFaults
 
@@ -57,26 +56,6 @@ def test_a_field_is_common_to_all_taxels(grasp):
         assert np.abs(turned - field[:, None]).max() < 1  # rounding
 
 
-def test_cross_talk_is_found():
-    times = np.arange(0, 9, 0.05)
-    rng, thumb = np.random.default_rng(0), synthetic_recording("made", 0).modules["thumb"].sensor
-    grip = np.interp(times, [1.5, 2, 7, 7.4], [0, 1, 1, 0])[:, None, None]
-    load = grip * rng.uniform(0.1, 1, (30, 1)) * [50, 20, 900]
-    noise = 33_000 + rng.normal(0, 2, (2, len(times), 30, 3))
-    counts = {"thumb": np.rint(noise[0] + load), "index": np.rint(noise[1])}
-    rest = dict.fromkeys(counts, np.full((30, 3), 33_000.0))
-    sensors = dict.fromkeys(counts, thumb)
-    found = MagneticFaults(cross_talk=0.1).apply(sensors, counts, times, rest, 5)
-    comparison = ModuleComparison()
-    (alike,) = [
-        each
-        for k, time in enumerate(times)
-        for each in comparison.update({name: own[k] for name, own in found.items()}, time)
-    ]
-    assert (alike.module, alike.other) == ("index", "thumb")
-    assert alike.share == pytest.approx(0.1, rel=0.1)
-
-
 def test_an_aged_skin_is_weaker_and_noisier(grasp):
     aged = spoiled(grasp, invented_months=4)["thumb"]
     fresh = np.asarray(grasp.modules["thumb"].readings, dtype=float)
@@ -88,7 +67,7 @@ def test_an_aged_skin_is_weaker_and_noisier(grasp):
     ("options", "message"),
     [
         ({"drift": np.inf}, "drift"),
-        ({"zero_share": 2}, "shares"),
+        ({"zero_share": 2}, "share"),
         ({"turn_time": 0}, "turn time"),
     ],
 )

@@ -187,17 +187,6 @@ class TestSeeds:
         assert (thumb.n_repeats > 0) == ("server" in change)
         assert (np.ptp(np.diff(thumb.times)) > 1e-6) == ("server" in change)
 
-    def test_a_callback_changes_nothing(self, held):
-        seen = []
-        with pytest.MonkeyPatch.context() as patch:
-            quiet_hand = msgspec.structs.replace(SHORT, glitch_rate=0.0)
-            patch.setattr(simulation, "profile", lambda _: quiet_hand)
-            watched = simulate(
-                Grasp("can", 1, 1), on_sample=lambda world, command: seen.append(command.phase)
-            )
-        assert watched.digest == held.digest
-        assert seen == list(held.truth.hand["phase"])
-
 
 class TestLongHold:
     def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):

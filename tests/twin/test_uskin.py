@@ -13,8 +13,6 @@ from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import (
     Uskin,
     UskinParameters,
-    kept_in_gaps,
-    last_updates,
     taxel_shares,
     with_server_effects,
 )
@@ -427,27 +425,6 @@ def test_server_times_increase_and_packets_stay_in_order(n, seed, jitter):
     assert set(np.diff(sent).tolist()) <= {0, 1, 2}
     assert not ((np.diff(sent)[1:] == 0) & (np.diff(sent)[:-1] == 0)).any()
     assert (sent <= np.arange(n)).all()  # nothing is sent before it is measured
-
-
-@given(st.floats(1.0, 5.0), st.floats(0.0, 1.0), st.integers(1, 300))
-def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
-    shown = last_updates(np.arange(n) / RATE, RATE / rows, phase)
-    assert shown[0] == 0
-    assert (shown <= np.arange(n)).all()
-    assert (np.arange(n) - shown < rows + 1).all()
-    assert (np.diff(shown) >= 0).all()
-    assert len(np.unique(shown)) == pytest.approx(n / rows, abs=2)
-
-
-def test_gaps_lose_all_rows_of_their_time():
-    times = np.arange(50_000) / 500
-    kept = kept_in_gaps(times, 0.5, (0.019, 0.025), np.random.default_rng(2))
-    gaps = np.diff(times[kept])
-    gaps = gaps[gaps > 1.5 / 500]
-    assert 30 <= len(gaps) <= 70
-    assert gaps.max() < 0.06
-    assert np.median(gaps) == pytest.approx(0.022 + 1 / 500, abs=0.002)
-    assert kept[[0, -1]].all()
 
 
 @pytest.mark.parametrize("share", [0.0, 0.075, 0.3])

@@ -47,11 +47,11 @@ class Trees:
         """
         rows = feature_rows(features, self.n_features)
         probabilities = np.full(len(rows), np.nan)
-        known = ~np.isnan(rows).any(axis=1)
-        if known.any():
+        complete = ~np.isnan(rows).any(axis=1)
+        if complete.any():
             with _one_thread():
-                balanced = self.estimator.predict_proba(rows[known])[:, 1]
-            probabilities[known] = balanced / (balanced + self.class_ratio * (1.0 - balanced))
+                balanced = self.estimator.predict_proba(rows[complete])[:, 1]
+            probabilities[complete] = balanced / (balanced + self.class_ratio * (1.0 - balanced))
         return probabilities
 
 

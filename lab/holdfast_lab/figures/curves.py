@@ -17,7 +17,6 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     default_settings,
-    legend_handles,
     literal,
     page_figure,
     panels,
@@ -25,6 +24,7 @@ from holdfast.plots.style import (
     style_axes,
 )
 from holdfast.sensors.types import Array
+from holdfast_lab.figures.legends import legend_handles
 
 MAX_TICKS = 9
 """Maximum number of values of x that all get a tick."""

@@ -15,7 +15,6 @@ from holdfast.plots.style import (
     add_labels,
     add_legend,
     default_settings,
-    legend_handles,
     literal,
     page_figure,
     panels,
@@ -23,6 +22,7 @@ from holdfast.plots.style import (
     style_axes,
 )
 from holdfast.sensors.types import Array
+from holdfast_lab.figures.legends import legend_handles
 
 
 class IntervalEstimate(NamedTuple):

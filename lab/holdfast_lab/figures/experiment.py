@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.plots.style import (
     COMPONENT_COLOURS,
     FONT_SIZE,
@@ -30,11 +30,19 @@ from holdfast.plots.time_series import (
     draw_sigma,
     equal_spans,
     line_handle,
-    phase_handles,
-    shade_phases,
 )
 from holdfast.sensors.types import Array
 
+PHASE_COLOURS = {
+    Phase.FREE: "#eeeeee",
+    Phase.CLOSING: "#fbe3b5",
+    Phase.LOCKED: "#c9ead9",
+    Phase.DISTURBED: "#cfe6f7",
+    Phase.SLIPPING: "#f6cdb6",
+    Phase.RELEASED: "#e6d8ec",
+}
+LETTER_WIDTH = 0.0083
+"""Width of a letter of a phase's name, as a fraction of the width of the axes."""
 STATE_TITLES = {STABLE: "1: stable", UNSTABLE: "0: not stable", NO_CONTACT: "0: no contact"}
 LABEL_STRIP = "label"
 AMPLITUDE_COLOUR = COMPONENT_COLOURS["F_a"]
@@ -133,9 +141,9 @@ def _draw_strips(axes: Axes, series: FingerSeries, strips: Mapping[str, StateCod
             names.append(name)
             continue
         # Where both are known; samples without a label or without an estimate do not count.
-        known = (series.labels != UNKNOWN) & (codes != UNKNOWN)
-        correct = ((series.labels == STABLE) == (codes == STABLE))[known]
-        accuracy = f"{100 * np.mean(correct):.1f} % correct" if known.any() else "no label"
+        decided = (series.labels != UNKNOWN) & (codes != UNKNOWN)
+        correct = ((series.labels == STABLE) == (codes == STABLE))[decided]
+        accuracy = f"{100 * np.mean(correct):.1f} % correct" if decided.any() else "no label"
         names.append(f"{literal(name)}\n{accuracy}")
     axes.set_yticks(range(len(strips)), names)
     axes.set_ylim(len(strips) - 0.5, -0.5)
@@ -160,4 +168,36 @@ def _state_handles(strips: Iterable[StateCodes]) -> list[Artist]:
         Patch(facecolor=colour, label=STATE_TITLES[state])
         for state, colour in STATE_COLOURS.items()
         if state in present
+    ]
+
+
+def shade_phases(axes: Axes, series: FingerSeries, *, named: bool = False) -> None:
+    """Shade each phase.
+
+    Args:
+        axes: to draw on.
+        series: with phases.
+        named: write the name above each phase that is wide enough.
+    """
+    spans = list(equal_spans(series.times, series.phases))
+    duration = spans[-1][2] - spans[0][1] if spans else 1.0
+    for first, start, end in spans:
+        name = str(series.phases[first])
+        if not name:
+            continue
+        axes.axvspan(start, end, facecolor=PHASE_COLOURS[Phase(name)], linewidth=0, zorder=0)
+        if named and (end - start) / duration > LETTER_WIDTH * (len(name) + 1):
+            axes.annotate(
+                name, ((start + end) / 2, 1), xycoords=("data", "axes fraction"),
+                xytext=(0, 2), textcoords="offset points", ha="center", fontsize=FONT_SIZE - 0.5,
+            )  # fmt: skip
+
+
+def phase_handles(series: FingerSeries) -> list[Artist]:
+    """Return the legend handles of the phases of a series."""
+    present = set(series.phases.tolist())
+    return [
+        Patch(facecolor=colour, label=str(phase))
+        for phase, colour in PHASE_COLOURS.items()
+        if phase in present
     ]

@@ -43,7 +43,7 @@ with gaps; an arm carries the hand all the time; a person does."""
 
 @dataclass(frozen=True)
 class StreamEffects:
-    """What comes between a sensor and the rows of a recording.
+    """Changes of the readings between a sensor and the rows of a recording.
 
     Attributes:
         rows_per_update: rows in which an update of the sensor is shown; 1: it updates each row.
@@ -92,7 +92,7 @@ def measured_ranges() -> dict[str, dict[str, Any]]:
 def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
     """Draw a sensor of a kind: rate, unit, gains, cross-talk, noise, lag and drift."""
     span = ranges()["sensor"]
-    known = _sensor(kind)
+    template = _sensor(kind)
     newtons = kind == "papillarray" or generator.random() < span["newtons"]
     rate = round(log_uniform(generator, span["rate"]), 1)
     scale = log_uniform(generator, span["scale"])
@@ -111,8 +111,8 @@ def draw_sensor(generator: np.random.Generator, kind: str) -> SensorDraw:
         thermal_counts=_scaled(base.thermal_counts, drift * scale),
         noise_counts=log_uniform(generator, span["noise"]) * base.noise_counts,
     )
-    ends = None if newtons else known.range
-    made = replace(known, rate=rate, unit="N" if newtons else "count", range=ends)
+    ends = None if newtons else template.range
+    made = replace(template, rate=rate, unit="N" if newtons else "count", range=ends)
     return SensorDraw(made, parameters)
 
 
@@ -265,8 +265,8 @@ def draw_layout(
     if kind == "uskin-curved":
         surface, normal, point = curved_fingertip(), np.array([1.0, 0.0, 0.0]), np.array(PAD_MIDDLE)
     else:
-        known = _sensor(kind)
-        surface = flat_patch(known.positions, _PITCH.get(kind, 6e-3))
+        template = _sensor(kind)
+        surface = flat_patch(template.positions, _PITCH.get(kind, 6e-3))
         normal, point = np.array([0.0, 0.0, 1.0]), np.zeros(3)
     room = max(item.half_height - (0.012 if n_pads == 2 else 0.034), 0.0)
     height = item.middle + room * uniform(generator, ranges()["object"]["off_centre"])

@@ -30,7 +30,7 @@ N_PAD_JOINTS = 3
 
 @dataclass(frozen=True)
 class Drives:
-    """What moves the pads.
+    """Drives of the pads.
 
     Attributes:
         stiffness: of the closing drive [N/m].

@@ -10,14 +10,14 @@ import numpy.typing as npt
 from holdfast.contact import Phase
 from holdfast.metrics.truth_labels import LabelRule, labels_from_truth
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors.types import Array
+from holdfast.sensors.types import Array, Flags, Integers
 from holdfast.twin.hand import FINGERS
 from holdfast.twin.operator import draw_tremor
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, THUMB_SHARE, Command, Plan, Protocol
 from holdfast.twin.simulation import generator_of
 from holdfast.twin.steps import hold_wrench
-from holdfast.twin.uskin import Uskin, kept_in_gaps, last_updates, with_server_effects
+from holdfast.twin.uskin import Uskin, with_server_effects
 from holdfast.twin.world import TruthLog
 from holdfast_lab.randomized.drawing import (
     MEASURED,
@@ -60,7 +60,7 @@ WATCHED_AFTER_LOSS = 1.5
 
 @dataclass(frozen=True)
 class RandomHold:
-    """Which recording of a randomized hand.
+    """Identity of a recording of a randomized hand.
 
     Attributes:
         number: from 0 on; every number is another hand, sensor, object and hold.
@@ -401,3 +401,46 @@ class _Holder(OperatorForce):
             out += held
             gravity = self._world.hand.model.opt.gravity
             out[:3] -= self._hold * self._weight_of * gravity
+
+
+def last_updates(times: npt.ArrayLike, rate: float, phase: float) -> Integers:
+    """Return (n,) the sample that each row of a stream shows, if the sensor updates slowly.
+
+    The sensor updates at a rate of its own; a row shows the first sample since the last update.
+
+    Args:
+        times: (n,) increasing times of the rows [s].
+        rate: of updates [Hz].
+        phase: of the updates, from 0 to 1.
+
+    Example:
+        >>> last_updates([0.0, 0.025, 0.05, 0.075, 0.1, 0.125], 10.0, 0.0).tolist()
+        [0, 0, 0, 0, 4, 4]
+    """
+    number = np.floor(np.asarray(times, dtype=np.float64) * rate + phase + 1e-9)
+    first = np.diff(number, prepend=-np.inf) > 0
+    result: Integers = np.maximum.accumulate(np.where(first, np.arange(len(number)), 0))
+    return result
+
+
+def kept_in_gaps(
+    times: npt.ArrayLike, rate: float, length: tuple[float, float], generator: np.random.Generator
+) -> Flags:
+    """Return (n,) which samples of a stream remain where packets are lost in gaps.
+
+    Args:
+        times: (n,) increasing times [s].
+        rate: of gaps [1/s].
+        length: range of the time in which all packets are lost [s].
+        generator: random number generator.
+    """
+    clock = np.asarray(times, dtype=np.float64)
+    kept = np.ones(len(clock), dtype=bool)
+    if len(clock) < 2:
+        return kept
+    n_gaps = int(generator.poisson(rate * (clock[-1] - clock[0])))
+    starts = generator.uniform(clock[0], clock[-1], n_gaps)
+    for start, stop in zip(starts, starts + generator.uniform(*length, n_gaps), strict=True):
+        kept[slice(*np.searchsorted(clock, (start, stop)))] = False
+    kept[[0, -1]] = True
+    return kept

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from holdfast.errors import DISTRIBUTION
-from holdfast.threads import usable_processors
+from holdfast.kernel.batch import usable_processors
 
 REPORTED_PACKAGES = (
     DISTRIBUTION, "numpy", "scipy", "scikit-learn", "optuna", "mujoco", "msgspec",

@@ -1,4 +1,4 @@
-"""What a report is made of: sections with a text, tables and figures; as one Markdown file."""
+"""Sections of a report, each with a text, tables and figures; as one Markdown file."""
 
 import io
 from collections.abc import Mapping, Sequence

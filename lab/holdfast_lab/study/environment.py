@@ -22,7 +22,7 @@ ROLES = {
     "taught-pushes": "the same, with pushes",
     "real": "recordings of a real hand or gripper",
 }
-"""What the recordings of each role are."""
+"""Description of the recordings of each role."""
 
 
 def data(plan: StudyPlan) -> dict[str, dict[str, Any]]:

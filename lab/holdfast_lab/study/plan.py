@@ -65,7 +65,7 @@ class Corpus(msgspec.Struct, frozen=True):
 
     @property
     def identity(self) -> tuple[str, str]:
-        """What tells its recordings from those of other corpora, and of earlier versions."""
+        """Folder and digest that identify the corpus and its version."""
         return self.folder, self.digest
 
     @property
@@ -161,8 +161,8 @@ def scan_corpus(name: str, folder: str | Path, tare: str = "0.5") -> Corpus:
             digest.update(content_digest(recording))
             for finger, module in recording.modules.items():
                 if module.labels:
-                    known = module.label_states[module.label_states != UNKNOWN]
-                    n_labelled.setdefault(finger, Counter()).update((known == STABLE).tolist())
+                    states = module.label_states[module.label_states != UNKNOWN]
+                    n_labelled.setdefault(finger, Counter()).update((states == STABLE).tolist())
             yield recording
 
     scan = scan_dataset(counted())
@@ -198,8 +198,8 @@ def content_digest(recording: Recording) -> bytes:
     state = hashlib.blake2b(repr((recording.name, recording.digest, labels, metadata)).encode())
     if truth := recording.truth:
         arrays = [("times", truth.times), *truth.hand.items()]
-        arrays += [(f"{finger} {name}", array) for finger, each in truth.fingers.items()
-                   for name, array in each.items()]  # fmt: skip
+        arrays += [(f"{finger} {name}", array) for finger, arrays_of_finger in truth.fingers.items()
+                   for name, array in arrays_of_finger.items()]  # fmt: skip
         for key, array in arrays:
             # With type and shape: equal bytes of other arrays must not give the same digest.
             state.update(f"{key} {array.dtype} {array.shape}".encode())

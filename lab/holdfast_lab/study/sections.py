@@ -97,9 +97,11 @@ def report_sections(
 
 def _select(outline: SectionOutline, by_part: Mapping[str, Sequence[E]]) -> list[E]:
     """Return what an outline names, in that order, then the rest of its part."""
-    every = {each.name: each for part in by_part.values() for each in part}
+    every = {section.name: section for part in by_part.values() for section in part}
     named = [every[name] for name in outline.names if name in every]
-    return named + [each for each in by_part.get(outline.part, ()) if each.name not in _NAMED]
+    return named + [
+        section for section in by_part.get(outline.part, ()) if section.name not in _NAMED
+    ]
 
 
 _NAMED = frozenset(name for outline in OUTLINES for name in outline.names)

@@ -51,9 +51,9 @@ def document_of(plan: TrialPlan, results: TrialResults, example: int | None) -> 
         "example": None if example is None else _example(results, example),
         "infeasible": infeasible_of(results),
         "trials": [
-            msgspec.json.decode(msgspec.json.encode(one))
-            for each in results.values()
-            for one in each
+            msgspec.json.decode(msgspec.json.encode(x))
+            for trials in results.values()
+            for x in trials
         ],
         "n_trials": plan.n,
         "model": plan.model if plan.model.startswith("builtin:") else Path(plan.model).name,
@@ -75,9 +75,9 @@ def example_of(results: TrialResults) -> int | None:
     """
     pairs = zip(results.get(BASELINE_LAW, ()), results.get(OWN_LAW, ()), strict=False)
     saved = (
-        own.number
-        for lost, own in pairs
-        if lost.held and lost.dropped and own.held and own.feasible and not own.dropped
+        trial.number
+        for lost, trial in pairs
+        if lost.held and lost.dropped and trial.held and trial.feasible and not trial.dropped
     )
     return next(saved, None)
 
@@ -94,7 +94,7 @@ def infeasible_of(results: TrialResults) -> list[dict[str, Any]]:
 def trials_csv(results: TrialResults) -> str:
     """Return a line for each trial with each law; `inf` is infinite, an empty field unknown."""
     names = list(TrialResult.__struct_fields__)
-    lines = ([getattr(one, name) for name in names] for each in results.values() for one in each)
+    lines = ([getattr(x, name) for name in names] for trials in results.values() for x in trials)
     rows = [["" if str(value) == "nan" else value for value in line] for line in lines]
     return csv_text([names, *rows])
 
@@ -103,15 +103,15 @@ def _summaries(results: TrialResults, **fields: object) -> dict[str, Summary]:
     """Return the numbers of each law over the trials whose fields have these values."""
     return {
         law: summarize(
-            [one for one in each if all(getattr(one, name) == fields[name] for name in fields)]
+            [x for x in trials if all(getattr(x, name) == fields[name] for name in fields)]
         )
-        for law, each in results.items()
+        for law, trials in results.items()
     }
 
 
 def _example(results: TrialResults, number: int) -> dict[str, Any]:
-    one = next(one for one in results[OWN_LAW] if one.number == number)
+    trial = next(trial for trial in results[OWN_LAW] if trial.number == number)
     return {
-        "number": number, "object": one.object, "kind": one.kind, "n_fingers": one.n_fingers,
+        "number": number, "object": trial.object, "kind": trial.kind, "n_fingers": trial.n_fingers,
         "lost_by": BASELINE_LAW, "held_by": OWN_LAW,
     }  # fmt: skip

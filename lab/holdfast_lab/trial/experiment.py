@@ -36,7 +36,7 @@ from holdfast_lab.trial.plan import TrialPlan
 from holdfast_lab.trial.trials import draw_trial
 
 COMPARISON = ReportKind("comparison of grip laws", "trial.json", ("trials.csv",))
-"""What the folder of a comparison holds."""
+"""Content of the folder of a comparison."""
 TRIAL_TITLE = "Grip laws against each other on the twin"
 WHAT_NUMBERS_MEAN = (
     "Results of a simulation: docs/study/grip.md says what each number means, docs/twin.md what "

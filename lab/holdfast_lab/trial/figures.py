@@ -19,12 +19,12 @@ from holdfast.plots.style import (
     add_legend,
     add_title,
     default_settings,
-    legend_handles,
     panels,
     series_styles,
 )
 from holdfast.sensors.types import Array
 from holdfast_lab.figures.dots import IntervalEstimate, draw_groups
+from holdfast_lab.figures.legends import legend_handles
 from holdfast_lab.report.sections import ReportFigure
 from holdfast_lab.trial.course import TrialCourse
 from holdfast_lab.trial.document import GOALS, TrialResults

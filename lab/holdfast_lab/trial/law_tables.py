@@ -181,8 +181,8 @@ def _rows(
             n = summary.get(column.n_field, summary.get("n_slipped", 0)) if column.n_field else 0
             number = summary[column.field]
             value, *ends = (
-                (math.inf if n else None) if each is None else column.factor * each
-                for each in (number["value"], *(number["interval"] or ()))
+                (math.inf if n else None) if bound is None else column.factor * bound
+                for bound in (number["value"], *(number["interval"] or ()))
             )
             yield Row(
                 {**(keys or {}), "law": law, "figure": column.head}, value, None, summary["n"],

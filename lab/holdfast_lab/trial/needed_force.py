@@ -78,18 +78,18 @@ class NeededForce(NamedTuple):
 def needed_force(trial: Trial) -> NeededForce:
     """Return the least forces of a trial, from its calm grip before the load."""
     patches = calm_patches(trial)
-    item, known = trial.grasp.item, {}  # most instants have the same load
+    item, forces = trial.grasp.item, {}  # most instants have the same load
     rows = []
     for held_for in np.arange(0.0, trial.duration + 1 / NEED_RATE, 1 / NEED_RATE).tolist():
         load = load_state([trial.load], held_for)
         carried = item.mass * (load.acceleration + UPWARD) - load.force
         key = (carried.tobytes(), load.friction)
-        if key not in known:
-            known[key] = [
+        if key not in forces:
+            forces[key] = [
                 least_normal_force(patches, carried, load.friction * mu)
                 for mu in (item.mu_static, item.mu_kinetic)
             ]
-        rows.append(known[key])
+        rows.append(forces[key])
     columns = np.array(rows)
     return NeededForce(columns[:, 0], columns[:, 1])
 

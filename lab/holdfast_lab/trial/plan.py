@@ -73,7 +73,7 @@ class TrialPlan:
 
     @property
     def _set(self) -> tuple[str, str, str, int]:
-        """What the tasks of all trials share."""
+        """Settings that the tasks of all trials share."""
         return self.model, self.model_digest, self.plant, self.n_impacts
 
     def trial_task(self, number: int, law: str) -> Task:

@@ -1,4 +1,4 @@
-"""What a law does before the load comes: false rises in quiet time, and rises after impacts."""
+"""Rises of force before the load comes: false ones in quiet time, and those after impacts."""
 
 import math
 from collections.abc import Sequence

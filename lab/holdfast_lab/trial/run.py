@@ -188,7 +188,9 @@ class RunningTrial:
             self._law.know(self.simulation, self.trial)
         command = self._controller.update(estimate, time)
         # Fingers that a command leaves out keep the force of the first grip.
-        scales = {finger: each.scale for finger, each in command.fingers.items()}
+        scales = {
+            finger: finger_command.scale for finger, finger_command in command.fingers.items()
+        }
         self.scales = np.array([scales.get(finger, 1.0) for finger in FINGERS])
         return command
 

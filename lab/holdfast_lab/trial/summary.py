@@ -51,7 +51,7 @@ def summarize(results: Sequence[TrialResult]) -> Summary:
         >>> summarize([held, held])["dropped"]
         {'value': 100.0, 'interval': [100.0, 100.0]}
     """
-    # What no force can hold tells nothing about a law.
+    # Trials that no force can hold are left out: they say nothing about a law.
     held = [result for result in results if result.held and result.feasible]
     slips = [result.slip for result in held]
     reacting = [result for result in held if not math.isnan(reaction_time(result))]
@@ -112,30 +112,30 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
         `reacted_sooner` and `reacted_later` [%]. Each number is {"value": x, "interval": ...}.
     """
     # Paired by trial: what differs between trials, such as weight and friction, cancels.
-    by_number = {one.number: one for one in others if one.held and one.feasible}
+    by_number = {outcome.number: outcome for outcome in others if outcome.held and outcome.feasible}
     pairs = [
         (result, by_number[result.number])
         for result in results
         if result.held and result.feasible and result.number in by_number
     ]
     ones = [1.0] * len(pairs)
-    reactions = [(reaction_time(one), reaction_time(other)) for one, other in pairs]
+    reactions = [(reaction_time(outcome), reaction_time(other)) for outcome, other in pairs]
     # NaN: there was no slip to react to under one of the laws.
-    known = [times for times in reactions if not np.isnan(times).any()]
+    times_of_both = [times for times in reactions if not np.isnan(times).any()]
     return {
         "n": len(pairs),
         "dropped": _ratio(
-            [100.0 * one.dropped - 100.0 * other.dropped for one, other in pairs], ones
+            [100.0 * outcome.dropped - 100.0 * other.dropped for outcome, other in pairs], ones
         ),
-        "slid_less": _mean([100.0 * (one.slip < other.slip) for one, other in pairs]),
-        "slid_more": _mean([100.0 * (one.slip > other.slip) for one, other in pairs]),
-        "reacted_sooner": _mean([100.0 * (one < other) for one, other in known]),
-        "reacted_later": _mean([100.0 * (one > other) for one, other in known]),
+        "slid_less": _mean([100.0 * (outcome.slip < other.slip) for outcome, other in pairs]),
+        "slid_more": _mean([100.0 * (outcome.slip > other.slip) for outcome, other in pairs]),
+        "reacted_sooner": _mean([100.0 * (outcome < other) for outcome, other in times_of_both]),
+        "reacted_later": _mean([100.0 * (outcome > other) for outcome, other in times_of_both]),
         "force_ratio_mean": _ratio(
-            [one.force_ratio - other.force_ratio for one, other in pairs], ones
+            [outcome.force_ratio - other.force_ratio for outcome, other in pairs], ones
         ),
         "peak_ratio_mean": _ratio(
-            [one.peak_ratio - other.peak_ratio for one, other in pairs], ones
+            [outcome.peak_ratio - other.peak_ratio for outcome, other in pairs], ones
         ),
         "false_reactions_per_minute": _false_reactions(pairs),
     }
@@ -143,16 +143,17 @@ def compare(results: Sequence[TrialResult], others: Sequence[TrialResult]) -> Su
 
 def _false_reactions(pairs: Sequence[tuple[TrialResult, TrialResult]]) -> Summary:
     """Return the difference of the rates of false reactions [1/min]; quiet times may differ."""
-    counts = np.array([[60.0 * one.n_false, one.quiet_time, 60.0 * other.n_false, other.quiet_time]
-                       for one, other in pairs]).reshape(-1, 4)  # fmt: skip
+    counts = np.array([
+        [60.0 * a.n_false, a.quiet_time, 60.0 * b.n_false, b.quiet_time] for a, b in pairs
+    ]).reshape(-1, 4)  # fmt: skip
 
     def statistic(draws: Array) -> Array:
         sums = draws @ counts
         # A resample may have no quiet time under one of the laws.
-        known = (sums[:, 1] > 0) & (sums[:, 3] > 0)
-        rates = sums[known]
+        is_counted = (sums[:, 1] > 0) & (sums[:, 3] > 0)
+        rates = sums[is_counted]
         difference = np.full(len(sums), np.nan)
-        difference[known] = rates[:, 0] / rates[:, 1] - rates[:, 2] / rates[:, 3]
+        difference[is_counted] = rates[:, 0] / rates[:, 1] - rates[:, 2] / rates[:, 3]
         return difference
 
     value = float(statistic(np.ones((1, len(counts))))[0])
@@ -168,8 +169,8 @@ def _ratio(parts: Sequence[float], wholes: Sequence[float]) -> Summary:
 
 def _mean(values: Sequence[float]) -> Summary:
     """Return the mean of the values that are known: those that are not NaN."""
-    known = [value for value in values if not math.isnan(value)]
-    return _ratio(known, [1.0] * len(known))
+    numbers = [value for value in values if not math.isnan(value)]
+    return _ratio(numbers, [1.0] * len(numbers))
 
 
 def _quantile(values: Sequence[float], share: float) -> Summary:

@@ -6,8 +6,9 @@ from typing import Annotated, Any
 import typer
 
 from holdfast.cli.options import (
-    EngineOptions,
+    DEFAULT_JOBS,
     ForceOption,
+    JobsOption,
     JsonOption,
     SeedOption,
 )
@@ -43,7 +44,7 @@ def trial(
     impacts: Annotated[
         int, typer.Option("--impacts", help="Impacts of tools before the load of each trial.")
     ] = 0,
-    parallel: EngineOptions,
+    jobs: JobsOption = DEFAULT_JOBS,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -63,6 +64,7 @@ def trial(
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
       holdfast trial --out trials-hard --plant hard
     """
+    from holdfast.parallel import Engine
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.trial.experiment import COMPARISON, run_trials
     from holdfast_lab.trial.plan import ALL_ROWS, TrialPlan
@@ -71,10 +73,9 @@ def trial(
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
     plan = TrialPlan(names, number, seed, model, plant, impacts)
     check_output_folder(out, COMPARISON, force=force)
-    chosen = parallel.start()
     try:
         document = run_trials(
-            plan, out, chosen, progress=progress, notify=print_message, force=force
+            plan, out, Engine(jobs), progress=progress, notify=print_message, force=force
         )
     except KeyboardInterrupt:
         print_message(f"the finished trials are in {out}: the same command continues them")

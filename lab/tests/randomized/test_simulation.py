@@ -2,6 +2,8 @@ import functools
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from holdfast.contact import ContactState
 from holdfast.detection import fingertip_force
@@ -15,9 +17,16 @@ from holdfast_lab.randomized.drawing import (
     with_measured,
 )
 from holdfast_lab.randomized.scenario import EVENT_KINDS, draw_events
-from holdfast_lab.randomized.simulation import RandomHold, simulate_random
+from holdfast_lab.randomized.simulation import (
+    RandomHold,
+    kept_in_gaps,
+    last_updates,
+    simulate_random,
+)
 
 pytestmark = pytest.mark.slow
+
+RATE = 150.0
 
 
 @functools.cache
@@ -224,3 +233,24 @@ def test_events_fill_the_hold_and_do_not_overlap():
         assert ends[-1] < 18.0
         found |= {event.kind for event in events}
     assert found == set(EVENT_KINDS)
+
+
+@given(st.floats(1.0, 5.0), st.floats(0.0, 1.0), st.integers(1, 300))
+def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
+    shown = last_updates(np.arange(n) / RATE, RATE / rows, phase)
+    assert shown[0] == 0
+    assert (shown <= np.arange(n)).all()
+    assert (np.arange(n) - shown < rows + 1).all()
+    assert (np.diff(shown) >= 0).all()
+    assert len(np.unique(shown)) == pytest.approx(n / rows, abs=2)
+
+
+def test_gaps_lose_all_rows_of_their_time():
+    times = np.arange(50_000) / 500
+    kept = kept_in_gaps(times, 0.5, (0.019, 0.025), np.random.default_rng(2))
+    gaps = np.diff(times[kept])
+    gaps = gaps[gaps > 1.5 / 500]
+    assert 30 <= len(gaps) <= 70
+    assert gaps.max() < 0.06
+    assert np.median(gaps) == pytest.approx(0.022 + 1 / 500, abs=0.002)
+    assert kept[[0, -1]].all()

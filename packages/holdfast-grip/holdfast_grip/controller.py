@@ -91,8 +91,10 @@ class GripController:
                 f"newtons_per_unit: readings in counts expected, those of {', '.join(measured)} "
                 "are in N already: leave the calibration out"
             )
-        given = 1.0 if newtons_per_unit is None else newtons_per_unit
-        self._factors: Three = given if isinstance(given, tuple) else (given, given, given)
+        to_newtons = 1.0 if newtons_per_unit is None else newtons_per_unit
+        self._factors: Three = (
+            to_newtons if isinstance(to_newtons, tuple) else (to_newtons, to_newtons, to_newtons)
+        )
         if not all(math.isfinite(factor) and factor > 0 for factor in self._factors):
             raise ValueError(
                 f"newtons_per_unit: numbers above 0 expected, {newtons_per_unit} given"
@@ -238,14 +240,14 @@ class GripController:
         if not 0.0 <= dt < math.inf:
             return GripReason.CLOCK
         due = time - self._max_age
-        touching, known, problem = False, True, _NONE
+        touching, is_known, problem = False, True, _NONE
         for k, touch in enumerate(self._touches):
             finger = fingers.get(touch.finger)
             # First whether the numbers are new and known, then their values. `not >=`: NaN is late.
             if finger is None or not finger.time >= due:
                 problem = GripReason.STALE
             elif finger.state is _UNKNOWN or not IMPLAUSIBLE.isdisjoint(finger.faults):
-                touch.known = known = False
+                touch.known = is_known = False
                 if self._lasts(k, time):
                     is_gap = finger.reason is Reason.GAP  # samples are missing, no sensor is faulty
                     problem = GripReason.STALE if is_gap else GripReason.FINGER_FAULT
@@ -260,7 +262,7 @@ class GripController:
             if problem is not _NONE:
                 return problem
             touching = touching or touch.touching
-        self._all_known = known
+        self._all_known = is_known
         if touching:
             self._bad_since[-1] = math.inf
             return _NONE
@@ -342,9 +344,9 @@ class GripController:
         self._events.append(GripEvent(time, state, "", math.nan, reason))
 
 
-def _broken_law(law: Law, n: int, given: str) -> str:
+def _broken_law(law: Law, n: int, returned: str) -> str:
     """Return a message about what a law returned."""
     return (
         f"law {type(law).__name__}: the contract of laws expects a scale and a reason for each of "
-        f"{n} fingers, {given} given"
+        f"{n} fingers, {returned} given"
     )

@@ -70,7 +70,7 @@ class CommandGuard:
             fingers = {name: FingerCommand(self._scales.get(name, 1.0)) for name in names}
             release = self.limits.on_fault == "open"
             command = GripCommand(command.time, LoopState.FAULT, fingers, release, GripReason.LIMIT)
-        self._scales = {name: one.scale for name, one in command.fingers.items()}
+        self._scales = {name: target.scale for name, target in command.fingers.items()}
         if math.isfinite(command.time):
             # Never back: the time until the next command would allow a larger rise.
             self._checked_at = max(self._checked_at, command.time)
@@ -81,13 +81,13 @@ class CommandGuard:
         elapsed = command.time - self._checked_at
         # At a time of NaN no rise is allowed.
         elapsed = max(elapsed, 0.0) if math.isfinite(elapsed) else 0.0
-        for name, one in command.fingers.items():
-            if not limits.min_scale - SLACK <= one.scale <= limits.max_scale + SLACK:
+        for name, target in command.fingers.items():
+            if not limits.min_scale - SLACK <= target.scale <= limits.max_scale + SLACK:
                 return (
-                    f"{name}: a scale of {one.scale:g} given, {limits.min_scale:g} to "
+                    f"{name}: a scale of {target.scale:g} given, {limits.min_scale:g} to "
                     f"{limits.max_scale:g} expected"
                 )
-            rise = one.scale - self._scales.get(name, 1.0)
+            rise = target.scale - self._scales.get(name, 1.0)
             if rise > limits.rise * elapsed + SLACK:
                 return (
                     f"{name}: a rise of {rise:g} in {elapsed:g} s given, {limits.rise:g}/s at most"
@@ -97,5 +97,5 @@ class CommandGuard:
 
 def safe_command(last: GripCommand, reason: GripReason, *, release: bool) -> GripCommand:
     """Return a command that keeps the scales of the last one, or opens the hand."""
-    fingers = {name: FingerCommand(one.scale) for name, one in last.fingers.items()}
+    fingers = {name: FingerCommand(target.scale) for name, target in last.fingers.items()}
     return GripCommand(last.time, LoopState.FAULT, fingers, release, reason)

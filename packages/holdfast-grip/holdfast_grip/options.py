@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class FaultAction(StrEnum):
-    """What the hand does in a fault."""
+    """Action of the hand in a fault."""
 
     HOLD = "hold"
     OPEN = "open"

@@ -64,10 +64,10 @@ class Bag:
         self.topics: list[BagTopic] = []
         # Publishers of a type send the same definition, which is parsed once.
         definitions: dict[tuple[str, str], Definition | None] = {}
-        for one in sorted(reader.connections, key=lambda one: one.topic):
+        for x in sorted(reader.connections, key=lambda x: x.topic):
             # Definitions in IDL are not parsed.
-            text = one.msgdef.data if one.msgdef.format.name == "MSG" else ""
-            key, kind = (one.msgtype, text), short_name(one.msgtype)
+            text = x.msgdef.data if x.msgdef.format.name == "MSG" else ""
+            key, kind = (x.msgtype, text), short_name(x.msgtype)
             if key not in definitions and text.strip():
                 definitions[key] = None
                 with suppress(ValueError):  # a topic that cannot be read does not hide the others
@@ -75,9 +75,9 @@ class Bag:
             elif key not in definitions:
                 definitions[key] = None
                 if ros2:  # messages of known sensors first: ROS itself has none of these types
-                    standard = standard_definition(one.msgtype)
-                    definitions[key] = known_definition(one.msgtype) or standard
-            topic = BagTopic(one.topic, kind, definitions[key], one.msgcount, one.id)
+                    standard = standard_definition(x.msgtype)
+                    definitions[key] = known_definition(x.msgtype) or standard
+            topic = BagTopic(x.topic, kind, definitions[key], x.msgcount, x.id)
             self.topics.append(topic)
 
     def messages(self, topics: Iterable[BagTopic]) -> Iterator[tuple[BagTopic, float, bytes]]:
@@ -89,7 +89,7 @@ class Bag:
         by_number = {topic.number: topic for topic in topics}
         if not by_number:  # of rosbags, no connections are all
             return
-        connections = [one for one in self._reader.connections if one.id in by_number]
+        connections = [x for x in self._reader.connections if x.id in by_number]
         with bag_errors(self._path):
             for connection, nanoseconds, data in self._reader.messages(connections):
                 yield by_number[connection.id], nanoseconds * 1e-9, data
@@ -182,8 +182,8 @@ def poses_of(path: Path, wanted: Mapping[str, str]) -> dict[str, Array]:
                 rows.setdefault(name, []).append((pose.time, *pose.position, *pose.quaternion))
                 frames[name] = pose.frame
     if missing := [name for name in wanted.values() if name not in rows]:
-        found = ", ".join(sorted(rows)) or "none"
-        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {found}")
+        names = ", ".join(sorted(rows)) or "none"
+        raise RecordingError(f"{path} has no pose of {', '.join(missing)}; it has {names}")
     parents = sorted({frames[name] for name in wanted.values()})
     if len(parents) > 1:
         raise RecordingError(f"{path}: poses in one frame expected, {' and '.join(parents)} given")
@@ -250,12 +250,12 @@ class PoseDecoder:
             return [stamped_pose("", message["header"], pose["position"], pose["orientation"])]
         return [
             stamped_pose(
-                one["child_frame_id"],
-                one["header"],
-                one["transform"]["translation"],
-                one["transform"]["rotation"],
+                transform["child_frame_id"],
+                transform["header"],
+                transform["transform"]["translation"],
+                transform["transform"]["rotation"],
             )
-            for one in message["transforms"]
+            for transform in message["transforms"]
         ]
 
 

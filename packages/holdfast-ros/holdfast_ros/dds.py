@@ -114,9 +114,9 @@ class Node:
         Those of a program that was killed count until DDS notices, 10 s by default.
         """
         mine = self._participant.guid
-        found = [endpoint.participant_key for endpoint in ros_endpoints(self._publications)
+        writers = [endpoint.participant_key for endpoint in ros_endpoints(self._publications)
                  if ros_topic(endpoint) == topic]  # fmt: skip
-        return sum(key != mine for key in found)
+        return sum(key != mine for key in writers)
 
     def reader(self, topic: str, definition: Definition) -> "TopicReader":
         """Subscribe to a topic."""
@@ -149,10 +149,10 @@ class TopicReader:
 
     def take(self, timeout: float) -> list[bytes]:
         """Return the waiting messages; if there are none, wait up to `timeout` [s] for some."""
-        found = self._reader.take(MAX_MESSAGES_PER_READ)
-        if not found and self._wait.wait(duration(seconds=timeout)) > 0:
-            found = self._reader.take(MAX_MESSAGES_PER_READ)
-        return [one.data for one in found if not isinstance(one, InvalidSample)]
+        samples = self._reader.take(MAX_MESSAGES_PER_READ)
+        if not samples and self._wait.wait(duration(seconds=timeout)) > 0:
+            samples = self._reader.take(MAX_MESSAGES_PER_READ)
+        return [sample.data for sample in samples if not isinstance(sample, InvalidSample)]
 
     def n_writers(self) -> int:
         """Return the number of publishers on the topic."""
@@ -187,11 +187,11 @@ def ros_endpoints(reader: BuiltinDataReader) -> list[Any]:
     """Return the publishers or subscribers of all topics of ROS."""
     # Publishers that have left stay in the reader, as not alive.
     alive = InstanceState.Alive | ViewState.Any | SampleState.Any
-    found = reader.read(MAX_ENDPOINTS, ReadCondition(reader, alive))
+    samples = reader.read(MAX_ENDPOINTS, ReadCondition(reader, alive))
     return [
-        one
-        for one in found
-        if not isinstance(one, InvalidSample) and one.topic_name.startswith(TOPIC_PREFIX)
+        sample
+        for sample in samples
+        if not isinstance(sample, InvalidSample) and sample.topic_name.startswith(TOPIC_PREFIX)
     ]
 
 
@@ -212,13 +212,13 @@ def qos_of(reliability: object, depth: int) -> Qos:
     )
 
 
-def domain_number(given: str | None) -> int:
+def domain_number(domain: str | None) -> int:
     """Return the given ROS domain; by default that of `ROS_DOMAIN_ID`, otherwise 0.
 
     Raises:
         ValueError: the domain is not a number from 0 to 232.
     """
-    text = given if given is not None else os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
+    text = domain if domain is not None else os.environ.get("ROS_DOMAIN_ID", "").strip() or "0"
     if not (text.isdecimal() and int(text) <= MAX_DOMAIN):
         raise ValueError(f"a ROS domain from 0 to {MAX_DOMAIN} expected, {text!r} given")
     return int(text)
@@ -279,10 +279,10 @@ def idl_struct(name: str, types: Mapping[str, tuple[MessageField, ...]]) -> type
     """Return a type of DDS with the fields of a message, and of those inside it."""
     fields: dict[str, Any] = {}
     for field in types[name]:
-        one: Any = _PRIMITIVES.get(field.kind) or idl_struct(field.kind, types)
+        part: Any = _PRIMITIVES.get(field.kind) or idl_struct(field.kind, types)
         if field.size is not None:  # 0 for a list of any length
-            one = idl.sequence[one] if field.size == 0 else idl.array[one, field.size]  # type: ignore[misc]
-        fields[field.name] = one
+            part = idl.sequence[part] if field.size == 0 else idl.array[part, field.size]  # type: ignore[misc]
+        fields[field.name] = part
     _, kind = name.split("/")
     return make_idl_struct(kind, dds_type(name), fields, dataclassify=False)
 
@@ -369,9 +369,9 @@ class Link(Openable):
 def take_states(topic: str, reader: TopicReader, decode: MessageDecoder) -> list[JointStates]:
     """Return the joint states that wait at a reader."""
     waiting: list[bytes] = []
-    while found := reader.take(0.0):
-        waiting += found
-        if len(found) < MAX_MESSAGES_PER_READ:
+    while taken := reader.take(0.0):
+        waiting += taken
+        if len(taken) < MAX_MESSAGES_PER_READ:
             break
     try:
         messages = [decode(data) for data in waiting]

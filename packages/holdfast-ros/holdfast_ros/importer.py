@@ -87,14 +87,14 @@ def read(
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
-        known = _BagImport(path, bag)
+        bag_import = _BagImport(path, bag)
         if not sensors and not columns:
-            if known.topics:
-                yield known.recording(report)
+            if bag_import.topics:
+                yield bag_import.recording(report)
                 return
             if sum(topic.n_messages for topic in bag.topics) > MAX_PROPOSAL_MESSAGES:
-                raise known.no_topic()
-        wanted = {name.replace(".", "/"): one for name, one in (sensors or {}).items()}
+                raise bag_import.no_topic()
+        wanted = {name.replace(".", "/"): skin for name, skin in (sensors or {}).items()}
         arrays = arrays_of_topics(path, bag, wanted.keys() - {ANY_MODULE})
     source = ForeignFile(path, arrays, "--topic")
     try:
@@ -104,7 +104,7 @@ def read(
     except RecordingError as cause:
         if sensors or columns:
             raise
-        raise known.no_topic() from cause
+        raise bag_import.no_topic() from cause
 
 
 def poses(path: Path, bodies: Mapping[str, str]) -> dict[str, Array]:
@@ -272,7 +272,9 @@ class _BagImport:
         """Read the samples of all topics, in the order of time."""
         decoders = {topic.name: topic.decode for topic in topics}
         n_read = Counter[str]()
-        for part, time, data in self._bag.messages(part for one in topics for part in one.parts):
+        for part, time, data in self._bag.messages(
+            part for bag_topic in topics for part in bag_topic.parts
+        ):
             n_read[part.name] += 1
             for sample in decoders[part.name](data):
                 readings = readings_of(sample, "count")

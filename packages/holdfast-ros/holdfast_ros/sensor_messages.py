@@ -214,29 +214,31 @@ def from_sens_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the samples of a SensStream: all sensors of a XELA server."""
     return [
         DeviceSample(
-            one["sensor_pos"],
-            one["model"],
-            one["time"] if np.isfinite(one["time"]) and one["time"] > 0 else None,
+            record["sensor_pos"],
+            record["model"],
+            record["time"] if np.isfinite(record["time"]) and record["time"] > 0 else None,
             None,
-            one["message"],
-            whole_counts(one["taxels"]),
-            point_rows(one["forces"]).astype(np.float64),
+            record["message"],
+            whole_counts(record["taxels"]),
+            point_rows(record["forces"]).astype(np.float64),
         )
-        for one in message["sensors"]
+        for record in message["sensors"]
     ]
 
 
 def from_x_stream(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the samples of an XStream, which has neither models nor times."""
     return [
-        DeviceSample(one["sensor"], "", None, None, None, whole_counts(one["xyz"]), _NO_FORCES)
-        for one in message["data"]
+        DeviceSample(
+            record["sensor"], "", None, None, None, whole_counts(record["xyz"]), _NO_FORCES
+        )
+        for record in message["data"]
     ]
 
 
 def from_x_server(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the sample of an xServerMsg, of one sensor."""
-    counts = whole_counts([one["point"] for one in message["points"]])
+    counts = whole_counts([record["point"] for record in message["points"]])
     number, model = message["sensor"], message["model"]
     stamp = stamp_seconds(message["header"]["stamp"])
     return [DeviceSample(number, model, None, stamp, None, counts, _NO_FORCES)]
@@ -254,7 +256,7 @@ def from_sensor_state(message: Mapping[str, Any], names: Sequence[str]) -> list[
 def from_pad(message: Mapping[str, Any]) -> list[DeviceSample]:
     """Return the sample of a pad whose taxels have an index, a force [N], and more."""
     taxels = sorted(message["taxels"], key=itemgetter("index"))
-    forces = point_rows([one["force"] for one in taxels])
+    forces = point_rows([taxel["force"] for taxel in taxels])
     stamp = stamp_seconds(message["header"]["stamp"])
     return [DeviceSample(None, PAD, None, stamp, None, None, forces)]
 
@@ -313,22 +315,22 @@ _CONVERTERS: tuple[tuple[set[str], Callable[[Mapping[str, Any]], list[DeviceSamp
 
 
 def point_rows(
-    given: npt.NDArray[Any] | list[dict[str, Any]], names: Sequence[str] = "xyz"
+    points: npt.NDArray[Any] | list[dict[str, Any]], names: Sequence[str] = "xyz"
 ) -> npt.NDArray[Any]:
     """Return (n, 3) of points that are an array or dictionaries."""
-    if isinstance(given, np.ndarray):
-        return given
-    rows = [[one[name] for name in names] for one in given]
+    if isinstance(points, np.ndarray):
+        return points
+    rows = [[point[name] for name in names] for point in points]
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
 
-def whole_counts(given: npt.NDArray[Any] | list[dict[str, Any]]) -> npt.NDArray[np.uint16]:
+def whole_counts(points: npt.NDArray[Any] | list[dict[str, Any]]) -> npt.NDArray[np.uint16]:
     """Return (n, 3) of points whose counts may have a wider number type.
 
     Raises:
         ValueError: one is not a whole number of 16 bits.
     """
-    values = point_rows(given)
+    values = point_rows(points)
     if values.dtype == np.uint16:
         return values
     with np.errstate(invalid="ignore"):
@@ -369,7 +371,7 @@ def sensors_of(sample: DeviceSample, unit: Unit) -> dict[str, Sensor]:
     sensors = module_sensors(sample.model, len(readings))
     if unit == "count":
         return sensors
-    return {name: replace(one, unit=unit, range=None) for name, one in sensors.items()}
+    return {name: replace(skin, unit=unit, range=None) for name, skin in sensors.items()}
 
 
 def pad_sensor(n_taxels: int, unit: Unit) -> Sensor:

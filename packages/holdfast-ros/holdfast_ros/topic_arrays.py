@@ -61,18 +61,18 @@ def arrays_of_topics(path: Path, bag: Bag, names: Collection[str]) -> dict[str, 
     for topic, time, data in bag.messages(topics[n] for n in decoders):
         message = dict(shaped_fields(decoders[topic.number](data)))
         records.setdefault(topic.name, []).append({**message, "bag_time": time})
-    found: dict[str, StoredArray] = {}
-    for name, own in records.items():
-        arrays = arrays_of_records(own)
+    arrays_by_path: dict[str, StoredArray] = {}
+    for name, topic_records in records.items():
+        arrays = arrays_of_records(topic_records)
         for key in [key for key in arrays if key.endswith("bag_time")]:
             start = key.removesuffix("bag_time")
             header = arrays.get(f"{start}stamp")
             times = arrays.pop(key)
             is_good = header is not None and bool((np.diff(header.read(), prepend=0) > 0).all())
             arrays[f"{start}time"] = header if header is not None and is_good else times
-        arrays = {key: one for key, one in arrays.items() if not key.endswith("stamp")}
-        found |= {f"{name}/{key}": one for key, one in arrays.items()}
-    return found
+        arrays = {key: array for key, array in arrays.items() if not key.endswith("stamp")}
+        arrays_by_path |= {f"{name}/{key}": array for key, array in arrays.items()}
+    return arrays_by_path
 
 
 def shaped_fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
@@ -83,11 +83,11 @@ def shaped_fields(message: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
         message = {"header": message.get("header", {})}
     for name, value in message.items():
         if name == "header" and isinstance(value, Mapping):
-            yield from ((n, one) for n, one in shaped_fields(value) if n == "stamp")
+            yield from ((n, dimension) for n, dimension in shaped_fields(value) if n == "stamp")
         elif isinstance(value, Mapping) and (stamp := seconds_of(value)) is not None:
             yield name, stamp
         elif name == "data" and isinstance(value, np.ndarray) and "layout" in message:
-            sizes = [int(one["size"]) for one in message["layout"].get("dim", ())]
+            sizes = [int(dimension["size"]) for dimension in message["layout"].get("dim", ())]
             yield name, value.reshape(sizes) if prod(sizes) == value.size else value
         elif name != "layout":
             yield name, value
@@ -109,12 +109,14 @@ def point_fields(message: Mapping[str, Any]) -> dict[str, Any]:
     """
     n, step = message["width"] * message["height"], message["point_step"]
     order = ">" if message["is_bigendian"] else "<"
-    fields = [one for one in message["fields"] if one["datatype"] in _POINT_TYPES]
+    fields = [
+        point_field for point_field in message["fields"] if point_field["datatype"] in _POINT_TYPES
+    ]
     kind = np.dtype(
         {
-            "names": [one["name"] for one in fields],
-            "formats": [order + _POINT_TYPES[one["datatype"]] for one in fields],
-            "offsets": [one["offset"] for one in fields],
+            "names": [point_field["name"] for point_field in fields],
+            "formats": [order + _POINT_TYPES[point_field["datatype"]] for point_field in fields],
+            "offsets": [point_field["offset"] for point_field in fields],
             "itemsize": step,
         }
     )

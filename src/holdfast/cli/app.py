@@ -10,6 +10,7 @@ import keyword
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import is_dataclass
 from importlib import import_module
@@ -87,7 +88,7 @@ EPILOG = (
 )
 SETTINGS_FILE, SETTINGS_VARIABLE = "holdfast.toml", "HOLDFAST_CONFIG"
 SETTINGS_VERBS = ("detect", "serve", "record", "calibrate")
-"""Verbs that read this file in 0.3.0, as did those of other packages with a source."""
+"""Verbs that read this file in 0.3.0; verbs of other packages with a source did so too."""
 COMPLETE_VARIABLE = "_HOLDFAST_COMPLETE"
 """Is set by the completion script of a shell."""
 
@@ -113,11 +114,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run a verb, and return the exit code of the process.
 
     Args:
-        arguments: words after `holdfast`; by default those of the process.
+        arguments: words after `holdfast`; by default the arguments of the process.
 
     Returns:
         0 after success, 2 after bad input, 130 after an interrupt, 1 after an internal error.
     """
+    if arguments is None:  # this process is ours
+        # Processes that joblib starts would import from the working folder first.
+        os.environ.setdefault("PYTHONSAFEPATH", "1")
+        # joblib replaces a process whose memory grew, and loses no result.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given")
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         # Imports alone take seconds on a slow disk, before a verb can print anything.
@@ -188,8 +194,8 @@ def _add(app: typer.Typer, name: str, *, hidden: bool = False) -> None:
     def run(*, help_all: HelpAllOption = False, **values: Any) -> None:  # noqa: ANN401
         spread(**values)
 
-    own, shared = (inspect.signature(x).parameters for x in (run, spread))
-    options = [*shared.values(), own["help_all"]]
+    options_of_run, shared = (inspect.signature(x).parameters for x in (run, spread))
+    options = [*shared.values(), options_of_run["help_all"]]
     # Typer reads the options from the signature and the annotations.
     run.__signature__ = inspect.Signature(options)  # type: ignore[attr-defined]
     run.__annotations__ = {option.name: option.annotation for option in options}
@@ -304,7 +310,7 @@ def load_verb(name: str) -> Callable[..., None]:
 
 
 def spread_groups(verb: Callable[..., None]) -> Callable[..., None]:
-    """Return a function with the options of a verb, and those of its groups one by one.
+    """Return a function with the options of a verb and of its groups, one by one.
 
     A group is a parameter whose type is a dataclass; the fields are its options. The default of
     the parameter, or else those of the fields, are the defaults of the options. The options of
@@ -356,7 +362,7 @@ Values = dict[str, Any]
 
 
 def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[inspect.Parameter]:
-    """Return the options of a group as parameters; those of plug-ins one after the other.
+    """Return the options of a group as parameters; options of plug-ins follow each other.
 
     Plug-ins of a group that have an option of the same name share it.
     """
@@ -376,7 +382,7 @@ def _options_of(group: type, default: object = inspect.Parameter.empty) -> list[
 
 
 def _maker_of(group: type) -> Callable[[Values], object]:
-    """Return the function that makes the value of a group from those of its options."""
+    """Return the function that makes the value of a group from the values of its options."""
     if not issubclass(group, PluginOptions):
         return lambda values: group(**values)
     kinds = {name: type(plugin.OPTIONS) for name, plugin in group.plugins().items()}

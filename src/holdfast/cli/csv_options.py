@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 GRID = re.compile(r"[1-9]\d*x[1-9]\d*", re.IGNORECASE)
 SENSOR_OPTIONS = ("--sensor", "--array", "--topic")
 LAYOUT_OPTIONS = (*SENSOR_OPTIONS, "--columns", "--axes", "--unit")
-"""Options with a value that a proposal gives anew."""
+"""Options that a proposed command replaces, with their values."""
 ACCEPT = "--accept"
 
 
@@ -98,7 +98,7 @@ class CsvOptions:
         return None if layout == Columns() else layout
 
     def sensors(self) -> "dict[str, Sensor]":
-        """Return the sensors by module; `"*"` is that of all others.
+        """Return the sensors by module; the key `"*"` stands for all other modules.
 
         Raises:
             ValueError: a module has two sensors, or a sensor is unknown or not valid.

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 DEMO_MODEL = "builtin:twin"
 """The model of the demo: the best one that ships for the sensor of the simulated hand."""
 DEMO_OBJECTS, DEMO_CASES, N_DEMO_REPEATS = "mug,carton", "1,2", 1
-"""Objects of the demo, none of which `DEMO_MODEL` was trained on; cases and grasps of each."""
+"""Objects of the demo, with the cases and grasps of each; `DEMO_MODEL` was trained on others."""
 
 REPLAY_SPEED = 2.0
 """Speed of the replay in the terminal, as a multiple of `--speed`: 26 s of a grasp are long."""
@@ -129,7 +129,7 @@ def demo(
     print_paragraph(evaluation.verdict or "")
     print_line("a model of the paper's features, trained here, each grasp left out once:")
     print_paragraph(trained.verdict or "")
-    # What it shows stands last, where the eye is; all of it fits a screen of 24 lines.
+    # The result is printed last; all lines fit a screen of 24 lines.
     print_line()
     side = "before" if lead >= 0 else "after"
     print_line(f"{picture}: UNSTABLE {abs(lead):.2f} s {side} the authors' label")

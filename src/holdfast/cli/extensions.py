@@ -1,4 +1,4 @@
-"""What plug-ins add to verbs: formats of `export`, publishers of `serve`, and simulators.
+"""Plug-ins of verbs: formats of `export`, publishers of `serve`, and simulators.
 
 Such a plug-in is an object with `OPTIONS`, an instance of a frozen dataclass: its fields are the
 options that the verb gets, with their defaults, and the plug-in is used if one of them differs.
@@ -7,11 +7,9 @@ docs/plugins.md has what each kind does besides.
 
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from functools import partial
 from importlib import import_module
 from typing import Any, ClassVar
 
-from holdfast import children
 from holdfast.errors import is_installed
 from holdfast.plugins import Plugin, PluginGroup
 from holdfast.removed import REMOVED, removal
@@ -70,9 +68,9 @@ def _extension(function: str) -> Any:  # noqa: ANN401 (the function that convert
 EXPORTER_PLUGINS = PluginGroup("exporters", ("csv",), _extension("export"))
 """Formats of `holdfast export RECORDINGS`."""
 PUBLISHER_PLUGINS = PluginGroup("publishers", (), _extension("publisher"))
-"""What `holdfast serve` also publishes to."""
+"""Publishers of `holdfast serve` beside the page."""
 SIMULATOR_PLUGINS = PluginGroup("simulators", (), _extension("simulate"))
-"""What `holdfast simulate` simulates besides the grasps of an Allegro hand."""
+"""Simulators of `holdfast simulate` beside the grasps of an Allegro hand."""
 
 
 class ExporterOptions(PluginOptions):
@@ -102,36 +100,22 @@ PLUGIN_GROUPS = {
     "simulators": ("holdfast.cli.extensions", "SIMULATOR_PLUGINS"),
     "hands": ("holdfast_grip.hands", "HAND_PLUGINS"),
 }
-"""Module and name of each group of plug-ins, by kind; a child imports one of them. Hands need
-holdfast-grip."""
+"""Module and name of each group of plug-ins, by kind. Hands need holdfast-grip."""
 
 
 def plugin_states() -> list[Plugin]:
     """Return the plug-ins of other packages, and why some of them are skipped.
 
-    Each is imported in a child process, which it may end or block; those of a kind that was
-    removed are not.
+    Each is imported, except plug-ins of a kind that was removed.
     """
-    error = partial(children.answer_of_child, __name__, "plugin_error")
-    states = [
-        plugin
-        for kind, (module, _) in PLUGIN_GROUPS.items()
+    groups: list[PluginGroup[Any]] = [
+        getattr(import_module(module), name)
+        for module, name in PLUGIN_GROUPS.values()
         if is_installed(module.partition(".")[0])
-        for plugin in _plugin_group(kind).states(error)
     ]
+    states = [plugin for group in groups for plugin in group.states(group.error)]
     for kind in REMOVED["plugins"]:
         reason = removal("plugins", kind, f"the kind {kind} of plug-ins")
-        group = PluginGroup(kind, (), lambda _, loaded: loaded)
-        states += group.states(lambda *_, reason=reason: reason)
+        removed: PluginGroup[Any] = PluginGroup(kind, (), lambda _, loaded: loaded)
+        states += removed.states(dict.fromkeys(removed.names(report=False), reason).__getitem__)
     return states
-
-
-def plugin_error(kind: str, name: str) -> str:
-    """Return why a plug-in is skipped; empty if it can be used."""
-    return _plugin_group(kind).error(name)
-
-
-def _plugin_group(kind: str) -> PluginGroup[Any]:
-    module, name = PLUGIN_GROUPS[kind]
-    group: PluginGroup[Any] = getattr(import_module(module), name)
-    return group

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
-    from holdfast.parallel import Engine
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
@@ -41,7 +40,7 @@ PLOT_SUFFIXES = (".pdf", ".png", ".svg")
 
 
 class RatePolicy(StrEnum):
-    """What to do with a source whose rate is not within 20 % of the model's."""
+    """Whether a source is resampled or refused if its rate is not within 20 % of the model's."""
 
     RESAMPLE = "resample"
     STRICT = "strict"
@@ -81,8 +80,20 @@ SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numb
 DEFAULT_JOBS = 1
 """Value of `--jobs` of every verb, as in scikit-learn: other processes take seconds to start, and
 each has the memory of its own recordings. Results do not depend on it."""
+
+
+def check_jobs(jobs: int) -> int:
+    """Return a number of processes, which is not 0."""
+    if jobs == 0:
+        raise ValueError("jobs other than 0 expected, 0 given")
+    return jobs
+
+
 JobsOption = Annotated[
-    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
+    int,
+    typer.Option(
+        "--jobs", help="Number of parallel processes; -1: one per processor.", callback=check_jobs
+    ),
 ]
 _TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
 TareOption = Annotated[str, _TARE]
@@ -178,34 +189,6 @@ class StartOptions:
 
 
 @dataclass(frozen=True)
-class EngineOptions:
-    """Group of options: where the work is done, and by how many processes."""
-
-    engine: Annotated[
-        str,
-        typer.Option(help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
-        RARE,
-    ] = "loky"
-    jobs: JobsOption = DEFAULT_JOBS
-
-    def start(self) -> "Engine":
-        """Return the engine, after a connection to it.
-
-        Raises:
-            ValueError: there is no such engine, or no jobs.
-            EngineError: no cluster answers at the address, or a worker has another version.
-            MissingExtra: dask is not installed.
-        """
-        from holdfast.parallel import Engine
-
-        if self.jobs == 0:
-            raise ValueError("jobs other than 0 expected, 0 given")
-        started = Engine.parse(self.engine, self.jobs)
-        started.check()  # a wrong address is reported now, not after the data are read
-        return started
-
-
-@dataclass(frozen=True)
 class DetectorOptions:
     """Group of options: how a model detects."""
 
@@ -225,28 +208,21 @@ class DetectorOptions:
         RARE,
     ] = None
     hysteresis: HysteresisOption = None
-    raw: Annotated[
-        bool,
-        typer.Option(
-            "--raw", help="Decide every sample by itself: no hold, minimum duration or hysteresis."
-        ),
-        RARE,
-    ] = False
     ignore: IgnoreOption = ""
 
     def load_model(self, name: str) -> "Model":
-        """Load a model, and apply `--debounce`, `--hysteresis` and `--raw`.
+        """Load a model, and apply `--debounce` and `--hysteresis`.
 
         Args:
             name: path of the model, or the name of a built-in one.
 
         Raises:
-            ValueError: a source is given instead of a model; or `--raw` and another value.
+            ValueError: a source is given instead of a model.
             ModelError: the model cannot be read.
         """
         from msgspec.structs import replace
 
-        from holdfast.detection import Debounce, Model
+        from holdfast.detection import Model
         from holdfast.devices.uri import is_uri
 
         # Before the model is read, whose message would name a missing file. builtin:any has the
@@ -256,20 +232,10 @@ class DetectorOptions:
             raise ValueError(
                 f"{name} is a source; MODEL SOURCE expected, such as builtin:any {name}"
             )
-        if self.raw and (self.debounce, self.hysteresis) != (None, None):
-            raise ValueError(
-                "--raw decides without debouncing; leave out --debounce and --hysteresis"
-            )
         model = Model.load(name)
-        # The defaults of `Debounce` are no debouncing.
-        trained = Debounce() if self.raw else model.debounce
-        debounce = Debounce(
-            trained.min_duration if self.debounce is None else self.debounce,
-            trained.hysteresis if self.hysteresis is None else self.hysteresis,
-            trained.hold,
-            trained.switching,
-        )
-        return replace(model, name=model.name or name, debounce=debounce)
+        chosen = {"min_duration": self.debounce, "hysteresis": self.hysteresis}
+        changes = {key: value for key, value in chosen.items() if value is not None}
+        return replace(model, name=model.name or name, debounce=replace(model.debounce, **changes))
 
     def create_stream(
         self, model: "Model", source: "Source", start: StartOptions
@@ -314,7 +280,7 @@ class ServerOptions:
         if token is not None and file is not None:
             raise ValueError("--token and --token-file given; only one of them expected")
         if file is None:
-            # What is typed wins over what the shell has set some time ago.
+            # An option that is typed outranks a variable of the shell.
             return os.environ.get(TOKEN_VARIABLE) if token is None else token
         try:
             if not file.is_file():

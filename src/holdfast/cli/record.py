@@ -29,14 +29,10 @@ def record(
     speed: Annotated[SpeedOption, RARE] = 1.0,
     object_name: Annotated[str, typer.Option("--object", help="Name of the object.")] = "",
     case: Annotated[str, typer.Option(help="Case of the experiment.")] = "",
-    note: Annotated[str, typer.Option(help="Note about the recording.")] = "",
     settings: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Other metadata; may be repeated."),
     ] = None,
-    fingers_only: Annotated[
-        bool, typer.Option("--fingers-only", help="Leave out pads and palm."), RARE
-    ] = False,
     fsync: Annotated[
         bool,
         typer.Option(
@@ -72,7 +68,7 @@ def record(
 
     check_seconds(seconds)
     check_speed(source, speed)
-    metadata = library.typed_metadata(object_name, case, note, settings or [])
+    metadata = library.typed_metadata(object_name, case, settings or [])
     # Before a device is awaited.
     path = library.recording_path(source, out, object_name, force=force)
     with (
@@ -81,9 +77,7 @@ def record(
         open_source(source, speed=speed) as opened,
     ):
         stop.graceful = True  # Ctrl-C from here on closes the file; before, it ends the wait
-        recorder = library.create_recorder(
-            opened, path, metadata, fingers_only=fingers_only, force=force, fsync=fsync
-        )
+        recorder = library.create_recorder(opened, path, metadata, force=force, fsync=fsync)
         print_message(f"recording {opened.name} to {path}")
         with (
             library.recording(opened, recorder), MarkerKeys() as keys, StatusLine(recorder) as line

@@ -94,11 +94,13 @@ def print_all(*, as_json: bool) -> None:
     """Print the name, taxels, unit, rate and maker of all sensors, and all hands."""
     from holdfast.sensors.built_in import HANDS, SENSORS_BY_MAKER
 
-    skins = [(make(), maker) for maker, own in SENSORS_BY_MAKER.items() for make in own.values()]
+    skins = [
+        (make(), maker) for maker, makers in SENSORS_BY_MAKER.items() for make in makers.values()
+    ]
     hands = [make() for make in HANDS.values()]
     if as_json:
         fields = ("name", "n_taxels", "unit", "rate", "range", "normal")
-        facts = [{n: getattr(one, n) for n in fields} | {"maker": maker} for one, maker in skins]
+        facts = [{n: getattr(skin, n) for n in fields} | {"maker": maker} for skin, maker in skins]
         print_json({"sensors": facts, "hands": [hand.to_dict() for hand in hands]})
         return
     rows = [(x.name, x.n_taxels, x.unit, f"{x.rate:g} Hz", maker) for x, maker in skins]

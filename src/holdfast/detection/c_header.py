@@ -2,15 +2,11 @@
 
 import math
 import re
-import shutil
-import subprocess
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 from importlib import resources
 from importlib.metadata import version
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -36,7 +32,7 @@ def kernel_text() -> str:
             return ""
         joined.add(name)
         text = (folder / name).read_text("utf-8")
-        return re.sub(r'#include "(\S+)"\n', lambda found: text_of(found[1]), text)
+        return re.sub(r'#include "(\S+)"\n', lambda include: text_of(include[1]), text)
 
     return text_of("holdfast.c").strip()
 
@@ -227,7 +223,7 @@ def _plain(name: str) -> str:
 def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     """Yield the names of fingers, reasons, faults and no cause as enumerations.
 
-    The kernel has those of states and causes.
+    The kernel's header has the codes of states and causes.
     """
     first = np.cumsum([0, *(sensor.n_taxels for sensor in sensors.values())]).tolist()
     # Names that are the same in capitals, or without signs, give way to numbers.
@@ -244,33 +240,3 @@ def _enums(sensors: Mapping[str, Sensor]) -> Iterator[str]:
     ):
         lines = (f"    HOLDFAST_{prefix}_{name} = {value}" for name, value in members)
         yield "enum {\n" + ",\n".join(lines) + "\n};"
-
-
-COMPILE_SECONDS = 60.0
-"""Time after which the compiler is stopped [s]."""
-
-
-def code_size(header: CHeader) -> int | None:
-    """Return the size of the compiled functions of a header [bytes].
-
-    It is that of this machine's `cc -O2`; None if there is no `cc` or no `size`, or they fail.
-    """
-    compiler, size = shutil.which("cc"), shutil.which("size")
-    if compiler is None or size is None:
-        return None
-    with TemporaryDirectory() as folder:
-        source, compiled = Path(folder) / "model.h", Path(folder) / "model.o"
-        source.write_text(header.text)
-        options = ["-std=c99", "-O2", "-DHOLDFAST_API=extern", "-x", "c", "-c"]
-        try:
-            for command in (
-                [compiler, *options, str(source), "-o", str(compiled)],
-                [size, "-A", str(compiled)],
-            ):
-                sections = subprocess.run(
-                    command, capture_output=True, text=True, timeout=COMPILE_SECONDS, check=True
-                ).stdout
-        except (OSError, subprocess.SubprocessError):
-            return None
-    lines = [line.split() for line in sections.splitlines()]
-    return sum(int(words[1]) for words in lines if words and words[0].startswith(".text"))

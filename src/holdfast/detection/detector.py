@@ -88,14 +88,14 @@ class Detector:
             sensors = {f: model.sensors[str(part.sensor)] for f, part in model.fingers.items()}
         first = next(iter(sensors.values()))
         plan = _ignoring(model.plan(sensors, rate or first.rate), ignore)
-        known = declared_baselines({BASELINES: baselines}, sensors)
+        stated = declared_baselines({BASELINES: baselines}, sensors)
         # Last, so that a wrong finger or taxel is reported first.
         if plan.tare.kind == "interval" and baselines is None:
             raise ModelError(
                 f"the model's tare is the interval {model.tare} s of a recording; "
                 "seconds, 'first' or 'none' expected where samples come one by one"
             )
-        self._plan = replace(plan, start=Start(in_contact, known))
+        self._plan = replace(plan, start=Start(in_contact, stated))
         self._names = (*plan.fingers, HAND)
         # Only `set_thresholds` replaces the rules. `_readings` and `_present` are memory for
         # samples of other types.
@@ -177,7 +177,7 @@ class Detector:
         if in_contact is not None:
             start = replace(self._plan.start, loaded=in_contact)
             self._plan = replace(self._plan, start=start)
-            # Which head decides about slips depends on the start; thresholds that were set stay.
+            # The start decides which slip head is used; thresholds that were set stay.
             thresholds = dict(enumerate(stable_thresholds(self._rules)))
             self._settings, rules, self._weights = self._model.config(self._plan)
             self._rules = with_thresholds(rules, thresholds)

@@ -416,7 +416,7 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         features = self.features
         check_limit("features of a finger", len(features), MAX_FEATURES)
         check_limit("samples in a window", max((x.window for x in features), default=0), MAX_WINDOW)
-        # The load is that of relative features, which the six of the paper do not have.
+        # Only relative features have a load; the six features of the paper are not relative.
         if self.contact_load is not None and not any(x.seconds for x in self.stable.features):
             raise ModelError("contact_load given; it needs at least one relative feature")
         for value in (self.contact_threshold, self.contact_noise, self.contact_load):
@@ -455,18 +455,18 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     @property
     def features(self) -> tuple[FeatureSpec, ...]:
-        """Features of all heads: those of `stable` in their order, then others of the rest."""
+        """Features of all heads: first those of `stable`, then further ones of other heads."""
         # By the name of the head: a model file may list them in any order.
         ordered = sorted(self.heads, key=lambda head: HEAD_NAMES.index(head.name))
         return tuple(dict.fromkeys(spec for head in ordered for spec in head.features))
 
     def indices(self, head: Head) -> Integers:
-        """Return the indices of the features of a head in those of the finger."""
+        """Return the index of each feature of a head in the list of the finger's features."""
         features = self.features
         return np.array([features.index(spec) for spec in head.features], dtype=np.int64)
 
     def with_heads(self, *heads: Head) -> "FingerModel":
-        """Return the model with some heads in place of those of the same names, or beside them."""
+        """Return the model with heads added; they replace heads of the same names."""
         by_name = {head.name: head for head in (*self.heads, *heads)}
         return msgspec.structs.replace(self, heads=tuple(by_name.values()))
 
@@ -517,18 +517,20 @@ class FingerModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         """Return mean and scale of a head, moved with those features that `stable` has, too."""
         mean, scale = head.rule.moments
         columns, n = self.indices(head), len(before[0])
-        own = columns < n  # the features of `stable` are the first
-        ratio = after[1][columns[own]] / before[1][columns[own]]
-        mean[own] = after[0][columns[own]] + ratio * (mean[own] - before[0][columns[own]])
-        scale[own] *= ratio
+        is_stable = columns < n  # the features of `stable` are the first
+        ratio = after[1][columns[is_stable]] / before[1][columns[is_stable]]
+        mean[is_stable] = after[0][columns[is_stable]] + ratio * (
+            mean[is_stable] - before[0][columns[is_stable]]
+        )
+        scale[is_stable] *= ratio
         return mean, scale
 
     def without_thresholds(self, name: HeadName) -> "FingerModel":
         """Return the model whose own handling does not set the threshold of a head."""
         replace = msgspec.structs.replace
         handling = {
-            sensor: replace(own, thresholds={k: t for k, t in own.thresholds.items() if k != name})
-            for sensor, own in self.handling.items()
+            sensor: replace(x, thresholds={k: t for k, t in x.thresholds.items() if k != name})
+            for sensor, x in self.handling.items()
         }
         return replace(self, handling=handling)
 
@@ -580,11 +582,11 @@ class Debounce(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return 0.5 * (1.0 + math.exp(-2.0 * self.switching_rate * seconds))
 
 
-def check_limit(what: str, given: float, most: float) -> None:
+def check_limit(what: str, value: float, most: float) -> None:
     """Refuse a number of things above a limit.
 
     Raises:
         ModelError: it is above the limit.
     """
-    if given > most:
-        raise ModelError(f"at most {most:.7g} {what} expected, {given} given")
+    if value > most:
+        raise ModelError(f"at most {most:.7g} {what} expected, {value} given")

@@ -1,4 +1,4 @@
-"""Constants of the C kernel as arrays of its structs: those of a plan, and those of a model."""
+"""Constants of the C kernel, as arrays of its structs, from a plan and a model."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -123,7 +123,7 @@ def n_levels(window: int) -> int:
 
 
 def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Sequence[Row]) -> Row:
-    tare, specs = plan.used_tare, [spec for own in features for spec in own]
+    tare, specs = plan.used_tare, [spec for x in features for spec in x]
     n_history = max([plan.window, *(spec.window for spec in specs)])
     # The stretch of the tare shows the noise too, as nothing touches; where the tare takes no
     # time, the first samples after it do. Under load the hand may move soon, so less is taken.
@@ -148,7 +148,7 @@ def _hand(plan: StreamPlan, features: Sequence[Sequence[FeatureSpec]], lags: Seq
         "tare_kind": TARE_KINDS.index(tare.kind),
         "tare_seconds": tare.seconds,
         "noise_seconds": noise_seconds,
-        "alike": len({tuple(own) for own in features}) == 1,
+        "alike": len({tuple(x) for x in features}) == 1,
         "has_centres": any(lag["has_changes"] for lag in lags),
         "zero_unknown": plan.zero_unknown,
     }
@@ -189,9 +189,9 @@ def _finger(sensor: Sensor, n_used: int, plan: StreamPlan, specs: Sequence[Featu
 
 
 def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]) -> list[Row]:
-    """Return the features of a finger, padded to those of the finger that has most."""
+    """Return the features of a finger, padded to the largest number of features of a finger."""
     # Scope is left out: `hand` takes the largest of values that each finger has computed anyway.
-    own = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
+    keys = [(spec.kind, spec.window, spec.transform, spec.floor, spec.seconds) for spec in specs]
     padding: Row = {
         "kind": -1, "transform": 0, "of_hand": False, "window": 0, "lag": 0, "same_as": 0,
         "floor": 0.0,
@@ -203,10 +203,10 @@ def _features(specs: Sequence[FeatureSpec], width: int, seconds: Sequence[float]
             "of_hand": spec.scope == SCOPES[1],
             "window": spec.window,
             "lag": seconds.index(spec.seconds) if spec.seconds else 0,
-            "same_as": own.index(alike),
+            "same_as": keys.index(alike),
             "floor": spec.floor,
         }
-        for spec, alike in zip(specs, own, strict=True)
+        for spec, alike in zip(specs, keys, strict=True)
     ] + [padding] * (width - len(specs))
 
 
@@ -232,8 +232,8 @@ def _positions(sensor: Sensor, used: Flags) -> Array:
 
 def _in_lanes(values: Array, n_lanes: int) -> Array:
     """Return values of the taxels of a finger (n_taxels, ...) in lanes: (..., n_lanes)."""
-    own = values.reshape(len(values), -1).T
-    return np.pad(own, ((0, 0), (0, n_lanes - own.shape[1]))).ravel()
+    rows = values.reshape(len(values), -1).T
+    return np.pad(rows, ((0, 0), (0, n_lanes - rows.shape[1]))).ravel()
 
 
 def model_config(
@@ -279,7 +279,10 @@ def model_config(
         "switching": debounce.switching_rate,
     }
     by_finger = structs("holdfast_head", heads).reshape(len(parts), len(KERNEL_HEADS))
-    rules = [_contact(part) | {"heads": own} for part, own in zip(parts, by_finger, strict=True)]
+    rules = [
+        _contact(part) | {"heads": of_finger}
+        for part, of_finger in zip(parts, by_finger, strict=True)
+    ]
     return ModelConfig(
         structs("holdfast_model", [settings]), structs("holdfast_rule", rules), weights
     )
@@ -320,7 +323,7 @@ def _numbers(part: FingerModel, head: Head | None) -> tuple[Array, Array, list[i
     if head is None:
         return np.zeros((0, 1)), np.zeros((0, 0)), []
     columns = part.indices(head)
-    # A head reads the features up to the last that it uses; those of slips read all.
+    # A head reads the features up to the last that it uses; slip heads read all.
     is_slip = head.name in ("slip", "slip_speed", "slip_changes")
     n = len(part.features) if is_slip else int(columns.max(initial=0)) + 1
     # A row is the intercept, then a weight for each feature: 0 for those that it does not use.

@@ -196,13 +196,13 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """Whether the model ever reports a slip: a threshold of 1 leaves it to `calibrate`."""
         names: tuple[HeadName, ...] = ("slip", "slip_changes")
         parts = self.fingers.values()
-        own = [handling.thresholds for part in parts for handling in part.handling.values()]
-        own += [{head.name: head.threshold for head in part.heads} for part in parts]
-        return any(thresholds.get(name, 1.0) < 1 for thresholds in own for name in names)
+        limits = [handling.thresholds for part in parts for handling in part.handling.values()]
+        limits += [{head.name: head.threshold for head in part.heads} for part in parts]
+        return any(thresholds.get(name, 1.0) < 1 for thresholds in limits for name in names)
 
     @property
     def slip_advice(self) -> str:
-        """What sets the threshold of slips if the model reports none; empty without such a rule."""
+        """Advice on how to set the threshold of slips, if the model reports none; else empty."""
         if self.reports_slips or not self.has_slip_rule:
             return ""
         name = self.name or "the model"
@@ -293,13 +293,13 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         Args:
             sensors: sensor of each finger on which the model is used.
         """
-        known = self.handled_sensors
+        handled = self.handled_sensors
         any_finger = ANY_FINGER in self.fingers
         names = dict.fromkeys(
             _sensor_of(ANY_FINGER if any_finger else finger, sensor.name)
             for finger, sensor in sensors.items()
         )
-        return [name for name in names if known and name not in known]
+        return [name for name in names if handled and name not in handled]
 
     def handling_advice(self, sensors: Mapping[str, Sensor]) -> str:
         """Return that default handling is used on some sensors, while others have their own.
@@ -415,11 +415,11 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         """
         sensors = self.fingers_of({n: m.sensor for n, m in recording.modules.items()})
         present = {name: sensor for name, sensor in sensors.items() if name in recording.modules}
-        found = extract(self.plan(present, recording.rate), recording)
+        rows = extract(self.plan(present, recording.rate), recording)
         probabilities = {}
         for name in present:
             part = self.finger(name, sensors[name])
-            features = found[name].features[:, part.indices(part.stable)]
+            features = rows[name].features[:, part.indices(part.stable)]
             probabilities[name] = part.stable.rule.probability(features)
         return probabilities
 
@@ -427,18 +427,18 @@ class Model(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
         wanted = self.finger(name).sensor
         if wanted is None:
             return
-        known = self.sensors[wanted]
-        if (sensor.name, sensor.n_taxels) != (known.name, known.n_taxels):
+        expected = self.sensors[wanted]
+        if (sensor.name, sensor.n_taxels) != (expected.name, expected.n_taxels):
             raise _other_sensor(
                 f"{name}: {sensor.n_taxels} taxels ({sensor.name}) given, the model expects "
-                f"{known.n_taxels} ({known.name})"
+                f"{expected.n_taxels} ({expected.name})"
             )
         # The unit after the kind: another sensor has often another unit as well.
-        if sensor.unit != known.unit:
+        if sensor.unit != expected.unit:
             raise _other_sensor(
-                f"{name}: readings in {sensor.unit} given, the model expects {known.unit}"
+                f"{name}: readings in {sensor.unit} given, the model expects {expected.unit}"
             )
-        if not np.allclose(sensor.rotations, known.rotations, atol=ROTATION_TOLERANCE):
+        if not np.allclose(sensor.rotations, expected.rotations, atol=ROTATION_TOLERANCE):
             raise _other_sensor(
                 f"{name}: the taxels of {sensor.name} have other rotations than those of the "
                 "training"
@@ -475,7 +475,7 @@ def _shipped(name: str) -> Model:
 def _noise_floor() -> Model:
     """Return a model without training: stable while sigma is under three times the noise.
 
-    The noise is that of the tare. At the noise itself the probability is 0.9, at nine times the
+    The noise is measured in the tare. At the noise itself the probability is 0.9, at nine times the
     noise it is 0.1.
     """
     slope = 2.0

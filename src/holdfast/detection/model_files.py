@@ -20,7 +20,7 @@ MODEL_SCHEMA = "holdfast.model/2"
 MAX_MODEL_SIZE = 1 << 24
 """Maximum size of a model file; one of all 18 modules of a hand has 2 MB [bytes]."""
 PARTS = re.compile(rb'"(type|kind)"\s*:\s*"(\w+)"')
-"""What a model file has where it names the rule of a head, or a feature."""
+"""Part of a model file with the name of the rule of a head, or of a feature."""
 
 
 def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
@@ -35,14 +35,14 @@ def read_model(path: str | Path, kind: type[ModelT]) -> ModelT:
         raise ModelError(f"cannot read the model {path}: {cause.strerror}") from cause
     try:
         check_keys(data)
-        found = msgspec.json.decode(data)
-        sensors = found.get("sensors") if isinstance(found, dict) else None
+        document = msgspec.json.decode(data)
+        sensors = document.get("sensors") if isinstance(document, dict) else None
         if isinstance(sensors, dict):
             for name, fields in sensors.items():
                 # A sensor is a dataclass, in which msgspec would ignore unknown fields.
                 sensors[name] = with_range(fields if isinstance(fields, dict) else {})
                 Sensor.from_dict(sensors[name])
-            data = msgspec.json.encode(found)
+            data = msgspec.json.encode(document)
         return decode(data, kind)
     except (ModelError, TypeError, ValueError, ArithmeticError, RecursionError) as cause:
         for key, name in ((key, name.decode()) for key, name in PARTS.findall(data)):

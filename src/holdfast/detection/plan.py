@@ -42,7 +42,7 @@ class Tare:
     interval: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
-    def parse(cls, given: "TareArgument | Tare") -> Self:
+    def parse(cls, tare: "TareArgument | Tare") -> Self:
         """Return the tare that a number, a text or a pair of times describes.
 
         Raises:
@@ -52,12 +52,12 @@ class Tare:
             >>> Tare.parse("0.5").seconds, Tare.parse("first").kind, Tare.parse("1:2").interval
             (0.5, 'first', (1.0, 2.0))
         """
-        if isinstance(given, Tare):
-            return cls(given.kind, given.seconds, given.interval)
-        if given in ("first", "none"):
-            return cls(given)  # type: ignore[arg-type]
+        if isinstance(tare, Tare):
+            return cls(tare.kind, tare.seconds, tare.interval)
+        if tare in ("first", "none"):
+            return cls(tare)  # type: ignore[arg-type]
         try:
-            times = given.split(":") if isinstance(given, str) and ":" in given else given
+            times = tare.split(":") if isinstance(tare, str) and ":" in tare else tare
             if isinstance(times, list | tuple):
                 start, end = (float(time) for time in times)
                 if not (math.isfinite(start) and math.isfinite(end) and start < end):
@@ -69,7 +69,7 @@ class Tare:
             return cls("seconds", seconds)
         except (TypeError, ValueError) as cause:
             raise ValueError(
-                f"tare: seconds above 0, 'first', 'none' or START:END expected, {given!r} given"
+                f"tare: seconds above 0, 'first', 'none' or START:END expected, {tare!r} given"
             ) from cause
 
     @property
@@ -198,8 +198,8 @@ class Start:
         """
         if not self.loaded or tare.kind in ("none", "interval"):
             return tare
-        known = all(name in self.baselines or s.unit == "N" for name, s in sensors.items())
-        return Tare("none" if known else "first")
+        has_zero = all(name in self.baselines or s.unit == "N" for name, s in sensors.items())
+        return Tare("none" if has_zero else "first")
 
 
 OPEN_HAND = Start()
@@ -327,8 +327,8 @@ class StreamPlan:
         baseline = np.zeros((sum(sensor.n_taxels for sensor in self.sensors.values()), 3))
         kind = self.used_tare.kind
         if kind == "interval" or (kind == "none" and self.start.loaded):
-            for finger, own in self.start.baselines.items():
-                baseline[self.slices[finger]] = own
+            for finger, stated in self.start.baselines.items():
+                baseline[self.slices[finger]] = stated
         return baseline
 
     def for_recording(self, recording: Recording) -> Self:

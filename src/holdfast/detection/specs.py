@@ -315,14 +315,14 @@ def parse_features(
     """
     if isinstance(names, str) and names in NAMED_FEATURES:
         return NAMED_FEATURES[names]
-    given = names.split(",") if isinstance(names, str) else list(names)
+    texts = names.split(",") if isinstance(names, str) else list(names)
     wanted: list[str] = []
-    for name in (name.strip() for name in given):
+    for name in (name.strip() for name in texts):
         wanted += ["F_x", "F_y", "F_z"] if name == "F_tip" else [name]
-    known = [kind.name for kind in KINDS.values() if kind.by_name]
-    if unknown := [name for name in wanted if name not in known]:
+    kinds = [kind.name for kind in KINDS.values() if kind.by_name]
+    if unknown := [name for name in wanted if name not in kinds]:
         raise ValueError(
-            f"unknown feature {unknown[0]!r}; there are {', '.join(known)}, F_tip for F_x, F_y "
+            f"unknown feature {unknown[0]!r}; there are {', '.join(kinds)}, F_tip for F_x, F_y "
             "and F_z, and holdfast or any alone for the project's own features"
         )
     if len(set(wanted)) < len(wanted):

@@ -54,9 +54,9 @@ class EstimateTypes(NamedTuple):
 
     Attributes:
         fingers: index of each finger by its name.
-        note: is called with (time, states before, states after) at each change of state.
+        note: function called with (time, states before, states after) at a change of state.
         hand: type of the estimate of a hand.
-        estimates: type of those of its fingers.
+        estimates: type of the estimates of its fingers.
         contact: type of the estimate of a finger.
         states: by code, as the two that follow.
         reasons: by code.
@@ -93,8 +93,8 @@ class FingerTrace(NamedTuple):
             faults.
         faulty_taxels: (n, n_words) bit i % 64 of word i // 64 is set if the taxel at index i is
             faulty by itself; `taxels_of(words)` of `holdfast.contact` are the indices.
-        cause: (n,) codes of the causes while UNSTABLE, or while it slides; 0 for none, of which
-            any other is `Cause(code)`.
+        cause: (n,) codes of the causes while UNSTABLE, or while it slides: `Cause(code)`; 0
+            without a cause.
         slip_probability: (n,); NaN while UNKNOWN. None for a model without a slip rule.
         slip_speed: (n,) speed of the slip [mm/s]; 0 while the finger does not slide, NaN while
             UNKNOWN. None for a model without a speed rule.
@@ -133,8 +133,10 @@ class FingerTrace(NamedTuple):
     def estimates(self, rows: slice = slice(None)) -> list[ContactEstimate]:
         """Return the estimates of these samples."""
         # None instead of a column: the model has no such head.
-        given = (self.slip_probability, self.slip_speed, self.slip_distance)
-        slips = (repeat(None) if column is None else column[rows].tolist() for column in given)
+        slip_columns = (self.slip_probability, self.slip_speed, self.slip_distance)
+        slips = (
+            repeat(None) if column is None else column[rows].tolist() for column in slip_columns
+        )
         columns = (
             column[rows] if column is self.faulty_taxels else column[rows].tolist()
             for column in self[:-3]
@@ -189,8 +191,8 @@ class Detection:
             return pd.Categorical.from_codes(codes, [word.value for word in kind])
 
         def texts(masks: Sequence[Mask], names: Callable[[Mask], Iterable[object]]) -> list[str]:
-            known = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
-            return [known[mask] for mask in masks]
+            text_of_mask = {mask: ", ".join(map(str, names(mask))) for mask in set(masks)}
+            return [text_of_mask[mask] for mask in masks]
 
         parts = []
         for finger, trace in self.fingers.items():
@@ -245,10 +247,10 @@ SMALL_TYPES = {"state": np.int8, "reason": np.int8, "cause": np.int8, "faults": 
 def detection_of(
     recording: Recording, fingers: Sequence[str], rules: Structs, chunks: Iterable[Chunk]
 ) -> Detection:
-    """Join the chunks of a recording, each of which is needed only until the next.
+    """Join the chunks of a recording; a chunk is not used after the next one comes.
 
     Args:
-        recording: of which all samples are in the chunks.
+        recording: all its samples are in the chunks.
         fingers: in the order of the columns.
         rules: (n_fingers,) of `holdfast_rule`: without a head, its columns are None.
         chunks: at least one, in order of time.

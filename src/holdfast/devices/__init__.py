@@ -1,1 +1,1 @@
-"""Whatever opens a connection: sources of samples, and hands that take commands."""
+"""Devices: sources of samples, and hands that take commands."""

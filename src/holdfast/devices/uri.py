@@ -10,7 +10,6 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from holdfast import children
 from holdfast.errors import MissingExtra, install_command, missing_part, require_extras
 from holdfast.plugins import PluginGroup
 from holdfast.sensors import Sensor
@@ -51,15 +50,15 @@ class Address:
     path: str
     parameters: Mapping[str, str]
 
-    def only(self, *known: str) -> None:
+    def only(self, *names: str) -> None:
         """Check that all parameters are known.
 
         Raises:
-            ValueError: a parameter is not among `known`.
+            ValueError: a parameter is not among `names`.
         """
-        if unknown := sorted(set(self.parameters) - set(known)):
+        if unknown := sorted(set(self.parameters) - set(names)):
             raise ValueError(
-                f"{self.text}: unknown parameter {', '.join(unknown)}; there are {', '.join(known)}"
+                f"{self.text}: unknown parameter {', '.join(unknown)}; there are {', '.join(names)}"
             )
 
     def names(self) -> dict[int, str]:
@@ -68,14 +67,14 @@ class Address:
         Raises:
             ValueError: the parameter has another form, or a number or a name occurs twice.
         """
-        given = self.parameters.get("fingers", "")
+        text = self.parameters.get("fingers", "")
         names: dict[int, str] = {}
-        for part in filter(None, given.split(",")):
+        for part in filter(None, text.split(",")):
             number, _, name = part.partition(":")
             if not (number.strip().isdecimal() and name.strip()):
-                raise ValueError(f"{self.text}: fingers=1:thumb,2:index expected, {given!r} given")
+                raise ValueError(f"{self.text}: fingers=1:thumb,2:index expected, {text!r} given")
             if int(number) in names or name.strip() in names.values():
-                raise ValueError(f"{self.text}: a name for each finger expected, {given!r} given")
+                raise ValueError(f"{self.text}: a name for each finger expected, {text!r} given")
             names[int(number)] = name.strip()
         return names
 
@@ -117,13 +116,13 @@ class Address:
         Raises:
             ValueError: there is no such file or sensor, or the file is not valid.
         """
-        given = self.parameters.get("sensor")
-        if given is None:
+        text = self.parameters.get("sensor")
+        if text is None:
             return None
         try:
-            return find_sensor(given)
+            return find_sensor(text)
         except OSError as cause:
-            raise ValueError(f"{self.text}: cannot read {given}: {cause.strerror}") from cause
+            raise ValueError(f"{self.text}: cannot read {text}: {cause.strerror}") from cause
         except ValueError as cause:
             raise ValueError(f"{self.text}: {cause}") from cause
 
@@ -223,15 +222,9 @@ def source_state(scheme: str) -> str:
 
 
 def source_states() -> dict[str, str]:
-    """Return in a few words whether the live sources of each scheme can be reached.
-
-    Plug-ins answer in a child process, which they may end or block.
-    """
-    states = {"xela": source_state("xela")}
-    for scheme in SOURCE_PLUGINS.names():
-        if state := children.answer_of_child(__name__, "source_state", scheme):
-            states[scheme] = state
-    return {**states, "serial": source_state("serial")}
+    """Return in a few words whether the live sources of each scheme can be reached."""
+    states = {name: source_state(name) for name in ("xela", *SOURCE_PLUGINS.names(), "serial")}
+    return {name: state for name, state in states.items() if state}
 
 
 def _source_maker(scheme: str) -> "Callable[[Address], Source]":

@@ -142,9 +142,9 @@ def _is_built_in(item: Sensor) -> bool:
     if item.name not in built_in_sensors():
         return False
     # A built-in name with other positions is another sensor: it needs a file of its own.
-    known = sensor(item.name)
-    calibrated = replace(known, unit=item.unit, range=None)  # as `Tactile` makes it
-    return item in (known, calibrated)
+    built_in = sensor(item.name)
+    calibrated = replace(built_in, unit=item.unit, range=None)  # as `Tactile` makes it
+    return item in (built_in, calibrated)
 
 
 def _write_table(path: Path, modules: Mapping[str, Tactile]) -> None:

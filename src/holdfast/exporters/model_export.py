@@ -16,7 +16,7 @@ HEADER_SUFFIX = ".h"
 
 
 class ExportedModel(NamedTuple):
-    """What was written.
+    """Facts about the file that was written.
 
     Attributes:
         path: of the file.

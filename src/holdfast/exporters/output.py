@@ -32,7 +32,7 @@ def whole_folder(
         )
     with _staging_beside(out) as staging:
         yield staging
-        # What is there goes beside the new folder; it is removed with it, or comes back.
+        # The old folder is kept beside the new one; it is removed at the end, or restored.
         before, existed = staging.with_name(f"{staging.name}.before"), out.exists()
         if existed:
             out.replace(before)

@@ -72,22 +72,22 @@ class MessageDecoder:
         return message
 
     def _message(self, source: "_Ros1Bytes", name: str) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        values: dict[str, Any] = {}
         for field in self._definition.types[name]:
             if field.size is None:
-                found[field.name] = self._value(source, field.kind)
+                values[field.name] = self._value(source, field.kind)
                 continue
             n = field.size or source.length()
             if field.kind in NUMBER_CODES:
-                found[field.name] = source.array(field.kind, n)
+                values[field.name] = source.array(field.kind, n)
             elif (number := self._points.get(field.kind)) is not None:
-                found[field.name] = source.array(number, 3 * n).reshape(n, 3)
+                values[field.name] = source.array(number, 3 * n).reshape(n, 3)
             # Before the list is made: a short message may claim 2^32 elements.
             elif n * self._sizes[field.kind] > source.n_left:
                 raise ValueError(f"{field.name}: {n} given, {source.n_left} bytes left")
             else:
-                found[field.name] = [self._value(source, field.kind) for _ in range(n)]
-        return found
+                values[field.name] = [self._value(source, field.kind) for _ in range(n)]
+        return values
 
     def _value(self, source: "_Ros1Bytes", kind: str) -> Any:  # noqa: ANN401 (any ROS type)
         if kind in NUMBER_CODES:
@@ -136,8 +136,8 @@ class MessageEncoder:
             if field.kind in NUMBER_CODES:
                 _append_numbers(data, field.kind, value)
             else:
-                for one in value:
-                    self._value(data, field.kind, one)
+                for item in value:
+                    self._value(data, field.kind, item)
 
     def _value(self, data: bytearray, kind: str, value: Any) -> None:  # noqa: ANN401
         if kind in NUMBER_CODES:

@@ -77,8 +77,8 @@ def load_dataset(folder: str | Path, *, labels: bool = True, in_contact: bool = 
         n_entries = len(list(path.iterdir()))
         # As the folder of `holdfast demo`, whose recordings are one level deeper.
         deeper = (p.parent for p in sorted(path.glob("[!.]*/*")) if is_recording(p))
-        found = next(deeper, None)
-        advice = f"{found} has some" if found else "`holdfast import` makes them"
+        inside = next(deeper, None)
+        advice = f"{inside} has some" if inside else "`holdfast import` makes them"
         what = (
             f"no recording in {path} ({n_entries} other entries)"
             if n_entries

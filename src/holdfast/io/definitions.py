@@ -134,7 +134,7 @@ def parse_definition(name: str, text: str) -> Definition:
                 # The package of the message comes first; `Header` alone is that of std_msgs, as in
                 # ROS 1.
                 names = (short, f"{package}/{short}", f"std_msgs/{short}")
-                kind = next((one for one in names if one in blocks), "")
+                kind = next((block_name for block_name in names if block_name in blocks), "")
                 if not kind:
                     raise ValueError(f"{block}: a field is of {short}, which is not defined")
             fields.append(MessageField(match["name"], kind, 0 if bounded else size))
@@ -151,7 +151,7 @@ def field_paths(definition: Definition) -> set[str]:
         >>> sorted(field_paths(parse_definition("p/A", "B[] b\n====\nMSG: p/B\nint8 x")))
         ['b[].x int8']
     """
-    found: set[str] = set()
+    paths: set[str] = set()
 
     def visit(name: str, prefix: str) -> None:
         for field in definition.types[name]:
@@ -159,10 +159,10 @@ def field_paths(definition: Definition) -> set[str]:
             if field.kind in definition.types:
                 visit(field.kind, f"{prefix}{field.name}{many}.")
             else:
-                found.add(f"{prefix}{field.name}{many} {field.kind}")
+                paths.add(f"{prefix}{field.name}{many} {field.kind}")
 
     visit(definition.name, "")
-    return found
+    return paths
 
 
 def _measure(
@@ -181,9 +181,9 @@ def _measure(
     if name not in sizes:
         size = 0
         for field in types[name]:
-            one = FIELD_SIZES.get(field.kind)
-            if one is None:
-                one = _measure(field.kind, types, sizes, (*inside, name))
-            size += LENGTH_SIZE if field.size == 0 else one * (field.size or 1)
+            field_size = FIELD_SIZES.get(field.kind)
+            if field_size is None:
+                field_size = _measure(field.kind, types, sizes, (*inside, name))
+            size += LENGTH_SIZE if field.size == 0 else field_size * (field.size or 1)
         sizes[name] = size
     return sizes[name]

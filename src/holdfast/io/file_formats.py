@@ -24,7 +24,7 @@ SUFFIXES = (".parquet", ".mcap")
 """Suffixes of the formats; the first is preferred if a recording exists in both."""
 
 MAX_MODULE_LAG = 1.0
-"""An MCAP file has the samples of one module after those of another. Samples that are newer
+"""An MCAP file has the samples of the modules one after the other. Samples that are newer
 than this may be incomplete [s]."""
 
 

@@ -1,7 +1,7 @@
 """Files of other programs, read in a child process with one limit of memory and time.
 
-What reads them can abort (h5py, pyarrow), hang, or take all memory for a file that is damaged or
-made by an attacker. The child ends then, and this process has one line.
+The libraries that read them can abort (h5py, pyarrow), hang, or take all memory for a file that
+is damaged or made by an attacker. The child ends then, and this process has one line.
 One child reads all files of an import, one at a time: while nothing is read, it waits.
 
 Requests and answers are lines of JSON on its pipes. Values come in a file of a private folder:
@@ -64,7 +64,7 @@ Arrays = list[npt.NDArray[Any]]
 
 
 class _Request(msgspec.Struct, frozen=True):
-    """What the child shall read, and whether with limits; paths are relative to `folder`."""
+    """Request to read a file, with or without limits; paths are relative to `folder`."""
 
     task: str
     path: bytes  # a name may be no UTF-8, which JSON cannot hold
@@ -74,7 +74,7 @@ class _Request(msgspec.Struct, frozen=True):
 
 
 class _Answer(msgspec.Struct, frozen=True):
-    """What came of it: a value in the file, the end of the values, or an error and its text."""
+    """Answer to a request: a value in the file, the end of the values, or the text of an error."""
 
     kind: Literal["ready", "value", "end", "memory", "error", "proposal"]
     text: str = ""
@@ -105,8 +105,8 @@ def read_foreign(
         ProposalError: the file does not say its layout.
         RecordingError: the child refuses it, ends, or takes more time or memory than it may.
     """
-    given = {key: one.to_dict() for key, one in (sensors or {}).items()}
-    options = {"format": name, "sensors": given, "columns": columns, "accept": accept}
+    skins = {key: skin.to_dict() for key, skin in (sensors or {}).items()}
+    options = {"format": name, "sensors": skins, "columns": columns, "accept": accept}
     for document, arrays in _values("import", path, options, limited=limited):
         if not arrays:
             report(os.fsdecode(document))
@@ -286,11 +286,11 @@ def end_children() -> None:
 
 
 def _pipe(pipe: Any) -> BinaryIO:  # noqa: ANN401 (subprocess declares it as optional)
-    found: BinaryIO = pipe
-    return found
+    stream: BinaryIO = pipe
+    return stream
 
 
-# What follows runs in the child.
+# The child process runs the functions below.
 
 
 def serve(folder: str) -> None:
@@ -365,14 +365,14 @@ def import_task(path: Path, request: _Request) -> Iterator[tuple[bytes, Arrays]]
 
     name = str(request.options["format"])
     source = importer(name)
-    # Before the limit: the memory of libraries is not that of the file.
+    # Before the limit: it is for the file, not for the libraries.
     for module in EXTRA_MODULES.get(extra_of(name) or "", ()):
         import_module(module)
     _limit_memory(request)
     lines: list[str] = []
     more: dict[str, object] = {}
     if takes_sensors(name):
-        sensors = {key: Sensor.from_dict(one) for key, one in request.options["sensors"].items()}
+        sensors = {key: Sensor.from_dict(skin) for key, skin in request.options["sensors"].items()}
         columns = msgspec.convert(request.options["columns"], Columns | None)
         more = {"sensors": sensors, "columns": columns, "report": lines.append}
         more["accept"] = request.options["accept"]

@@ -23,7 +23,7 @@ CSV_COLUMNS = ("finger", "start", "end", "state", "cause")
 
 
 class LabelOwner(msgspec.Struct, frozen=True, kw_only=True):
-    """Which recording a label file belongs to.
+    """Recording that a label file belongs to.
 
     Attributes:
         schema: kind and version of the file.

@@ -1,4 +1,4 @@
-"""MCAP files of recordings: save, load, and recover what is left of a cut file."""
+"""MCAP files of recordings: save, load, and recover the samples of a file that was cut."""
 
 import struct
 from collections.abc import Iterator
@@ -88,7 +88,7 @@ def save(recording: Recording, path: Path, *, force: bool = False) -> None:
 
 
 def load(path: Path) -> Recording:
-    """Load the recording in a file; if the file was cut, load what is left and valid.
+    """Load the recording in a file; if the file was cut, load its valid beginning.
 
     Raises:
         RecordingError: the file is damaged or not a recording, or nothing can be recovered.

@@ -138,7 +138,7 @@ def check_checksums(path: Path) -> None:
 
 
 def _is_plausible(opcode: int, length: int, head: bytes) -> bool:
-    """Return whether a record is one of a recording, and its length that of its content.
+    """Return whether a record is of a kind that recordings have, with a content as long as it says.
 
     Args:
         opcode: kind of the record.

@@ -8,9 +8,8 @@ A checksum over all bytes is stored in the footer of the file, so that any flipp
 """
 
 import hashlib
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from itertools import islice, product
 from pathlib import Path
 from typing import Any, Literal
@@ -53,8 +52,6 @@ GROUP_SIZE = 1 << 24
 """Maximum size of a row group in memory [bytes], if a row is not larger."""
 GROUP_ROWS = 1 << 16
 """Maximum number of rows in a row group."""
-MODULES_AHEAD = 4
-"""Modules of row groups that are read ahead of their use; 4 MB each for four fingertips."""
 BLOCK_SIZE = 1 << 20
 """Number of bytes that are read at a time."""
 
@@ -140,33 +137,6 @@ def read_groups(path: Path) -> tuple[Header, Iterator[TimedArrays], bool]:
     """
     header, file = _open(path)
     return header, _groups(header, file, path), True
-
-
-def read_columns(path: Path) -> tuple[Header, Iterator[TimedArrays]]:
-    """Return the header, and the arrays of the row groups with values (n_components, n).
-
-    The file has them in this order, so this is faster than `read_groups`.
-
-    Raises:
-        RecordingError: as in `load`.
-    """
-    header, file = _open(path)
-    specs = _specs(header, file, path)
-    read = _GroupReader(file, path, "C")
-
-    def modules_ahead() -> Iterator[TimedArrays]:
-        # A thread reads the next module while the caller uses one. Where memory is short, a new
-        # thread can end the process; so `load` has none.
-        modules = [([spec], _schema([spec]).names) for spec in specs if spec.track != "truth"]
-        parts = product(range(file.num_row_groups), modules)
-        with ThreadPoolExecutor(1) as reader:
-            ahead = (reader.submit(read, group, *module) for group, module in parts)
-            waiting = deque(islice(ahead, MODULES_AHEAD))
-            while waiting:
-                waiting.extend(islice(ahead, 1))
-                yield waiting.popleft().result()
-
-    return header, modules_ahead()
 
 
 def is_foreign(path: Path) -> bool:
@@ -292,19 +262,9 @@ def _padded(values: npt.NDArray[Any], n_rows: int) -> pa.Array:
 def _groups(header: Header, file: pq.ParquetFile, path: Path) -> Iterator[TimedArrays]:
     """Yield the arrays of each row group as they are in a recording, (n, ...)."""
     specs = _specs(header, file, path)
-    read = _GroupReader(file, path, "F")
-    shapes = {spec.topic: spec.shape for spec in specs}
-
-    def by_sample(arrays: TimedArrays) -> TimedArrays:
-        return {
-            topic: (times, values.T.reshape(len(times), *shapes[topic]))
-            if topic != TRUTH_TIME
-            else (times, times)
-            for topic, (times, values) in arrays.items()
-        }
-
+    _check_groups(file, path)
     # Not a generator: a file of other columns is refused by the call.
-    return (by_sample(read(group, specs)) for group in range(file.num_row_groups))
+    return (_read_group(file, path, group, specs) for group in range(file.num_row_groups))
 
 
 def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
@@ -314,65 +274,50 @@ def _specs(header: Header, file: pq.ParquetFile, path: Path) -> list[ArraySpec]:
     return specs
 
 
-class _GroupReader:
-    """Reader of the row groups of a file.
-
-    Args:
-        file: the file.
-        path: its path.
-        order: of the components of a sample in memory: "F" side by side, "C" apart.
+def _check_groups(file: pq.ParquetFile, path: Path) -> None:
+    """Check all row groups before the first is read: one of few bytes may claim any size.
 
     Raises:
         RecordingError: a row group is larger than recordings have.
     """
+    groups = map(file.metadata.row_group, range(file.num_row_groups))
+    if (n_rows := max((group.num_rows for group in groups), default=0)) > GROUP_ROWS:
+        raise RecordingError(
+            f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, {n_rows} given"
+        )
 
-    def __init__(self, file: pq.ParquetFile, path: Path, order: Literal["C", "F"]) -> None:
-        self._file = file
-        self._path = path
-        self._order = order
-        # All groups are checked before the first is read; a group of few bytes may claim any size.
-        groups = map(file.metadata.row_group, range(file.num_row_groups))
-        if (n_rows := max((group.num_rows for group in groups), default=0)) > GROUP_ROWS:
-            raise RecordingError(
-                f"{path} is damaged: a row group of at most {GROUP_ROWS} rows expected, "
-                f"{n_rows} given"
-            )
 
-    def __call__(
-        self, group: int, specs: list[ArraySpec], names: list[str] | None = None
-    ) -> TimedArrays:
-        """Return some arrays of a row group, with values (n_components, n).
+def _read_group(
+    file: pq.ParquetFile, path: Path, group: int, specs: list[ArraySpec]
+) -> TimedArrays:
+    """Return the arrays of a row group.
 
-        Args:
-            group: number of the row group.
-            specs: of the arrays.
-            names: of their columns; by default all columns of the file.
-
-        Raises:
-            RecordingError: it is damaged.
-        """
-        try:
-            table = self._file.read_row_group(group, columns=names)
-            columns = (column.combine_chunks() for column in table.columns)
-            arrays: dict[str, TimedArray] = {}
-            times: Array = np.empty(0)
-            for spec in specs:
-                # Columns have the order of the arrays; those of truth share the times of the first.
-                if spec.track != "truth" or spec.topic == TRUTH_TIME:
-                    column = next(columns)
-                    # Nulls are only after the last sample of the module in this span.
-                    times = _rows([column], len(column) - column.null_count)[0]
-                if spec.topic == TRUTH_TIME:
-                    arrays[spec.topic] = (times, times)
-                    continue
-                components = list(islice(columns, spec.n_components))
-                arrays[spec.topic] = (times, _rows(components, len(times), self._order))
-        except (pa.ArrowException, OSError, ValueError) as cause:
-            raise RecordingError(
-                f"{self._path} is damaged in row group {group}: {one_line(cause)}"
-            ) from cause
-        pa.default_memory_pool().release_unused()  # 50 MB, which Arrow would keep
-        return arrays
+    Raises:
+        RecordingError: it is damaged.
+    """
+    try:
+        table = file.read_row_group(group)
+        columns = (column.combine_chunks() for column in table.columns)
+        arrays: dict[str, TimedArray] = {}
+        times: Array = np.empty(0)
+        for spec in specs:
+            # Columns have the order of the arrays; all of the truth share the times of the first.
+            if spec.track != "truth" or spec.topic == TRUTH_TIME:
+                column = next(columns)
+                # Nulls are only after the last sample of the module in this span.
+                times = _rows([column], len(column) - column.null_count)[0]
+            if spec.topic == TRUTH_TIME:
+                arrays[spec.topic] = (times, times)
+                continue
+            # The components of a sample side by side in memory.
+            values = _rows(list(islice(columns, spec.n_components)), len(times), "F")
+            arrays[spec.topic] = (times, values.T.reshape(len(times), *spec.shape))
+    except (pa.ArrowException, OSError, ValueError) as cause:
+        raise RecordingError(
+            f"{path} is damaged in row group {group}: {one_line(cause)}"
+        ) from cause
+    pa.default_memory_pool().release_unused()  # 50 MB, which Arrow would keep
+    return arrays
 
 
 def _value_size(spec: ArraySpec) -> int:

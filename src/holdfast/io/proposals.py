@@ -1,4 +1,4 @@
-"""What a file does not say, and the options that say it: the proposal of `holdfast import`."""
+"""Proposal of `holdfast import`: the options that state the layout of a file."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""What a file may do to its reader: raise errors of any type, or take more memory than expected."""
+"""Errors of any type, and too much memory, that a damaged file may cause in its reader."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

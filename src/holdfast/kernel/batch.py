@@ -5,16 +5,13 @@ not depend on the number of threads.
 """
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from contextvars import ContextVar
 
 import numpy as np
 import numpy.typing as npt
 
 from holdfast.kernel import _extension
-from holdfast.threads import usable_processors
 
 Floats = npt.NDArray[np.float64]
 
@@ -25,26 +22,18 @@ PARTS_PER_THREAD = 4
 """The slower thread of two computes fewer parts."""
 
 
-_limit: ContextVar[int | None] = ContextVar("limit", default=None)
-
-
 def max_threads() -> int:
-    """Return how many threads a call may use: by the limit, OMP_NUM_THREADS, or the processors."""
-    limit = _limit.get()
-    given = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
-    if limit or given.isdecimal():
-        return limit or max(int(given), 1)
-    return usable_processors()
+    """Return how many threads a call may use: by OMP_NUM_THREADS, or the processors."""
+    text = os.environ.get("OMP_NUM_THREADS", "")  # joblib sets it for the processes it starts
+    return max(int(text), 1) if text.isdecimal() else usable_processors()
 
 
-@contextmanager
-def thread_limit(n: int) -> Iterator[None]:
-    """Let the calls of this thread use at most n threads."""
-    before = _limit.set(n)
-    try:
-        yield
-    finally:
-        _limit.reset(before)
+def usable_processors() -> int:
+    """Return the number of processors that this process may use."""
+    # A container or `taskset` may allow fewer than the machine has.
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def fill_haar_features(

@@ -12,8 +12,8 @@ FOLDERS = ("kernel", "twin/c")
 
 def digest(package: Path) -> str:
     """Return a digest of the names and the content of all C files of the package."""
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for path in sorted(path for name in FOLDERS for path in (package / name).glob("*.[ch]")):
         name = path.relative_to(package).as_posix()
-        found.update(f"{name}\0{path.read_text(encoding='utf-8')}\0".encode())
-    return found.hexdigest()[:16]
+        sha256.update(f"{name}\0{path.read_text(encoding='utf-8')}\0".encode())
+    return sha256.hexdigest()[:16]

@@ -22,7 +22,7 @@ class Field(NamedTuple):
 
     Attributes:
         name: of the field.
-        kind: its type, or that of its elements.
+        kind: its type, or the type of its elements.
         length: expression of the number of elements, of an array.
         is_pointer: whether it is a pointer.
         is_sized: whether it is an array where sizes are macros, else a pointer (HF_ARRAY).

@@ -78,13 +78,13 @@ def read_labels(path: Path, recording: Recording) -> ModuleLabels:
     if file.is_dir():
         # The label file first: it outranks what is inside a recording, as when one is loaded.
         stem, endings = file_stem(recording.name), (SUFFIX, *SUFFIXES, ".labels.csv", ".csv")
-        found = [at for ending in endings if (at := path / f"{stem}{ending}").is_file()]
-        if not found:
+        files = [at for ending in endings if (at := path / f"{stem}{ending}").is_file()]
+        if not files:
             raise RecordingError(
                 f"no labels of {recording.name!r} in {path}; "
                 f"{stem} with one of {', '.join(endings)} expected"
             )
-        file = found[0]
+        file = files[0]
     labels = _read(file, recording)
     try:
         validated = recording.with_labels(labels)
@@ -111,7 +111,7 @@ def _read(file: Path, recording: Recording) -> ModuleLabels:
             raise RecordingError(f"{cause}; {removed}") from cause
         _check_digest(file, labels.recording, labels.name, recording)
         try:
-            return {name: tuple(map(label_of, own)) for name, own in labels.modules.items()}
+            return {name: tuple(map(label_of, x)) for name, x in labels.modules.items()}
         except ValueError as cause:
             raise RecordingError(f"{file}: {cause}") from cause
     raise RecordingError(

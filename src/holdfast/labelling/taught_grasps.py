@@ -70,8 +70,8 @@ def label_grasp(path: Path, step: Step) -> tuple[list[Slide] | None, str]:
             labels = propose("tracking", recording, video=video)
         else:
             labels = {
-                name: tuple(_by_step(label, step) for label in own)
-                for name, own in propose("signal", recording).items()
+                name: tuple(_by_step(label, step) for label in spans)
+                for name, spans in propose("signal", recording).items()
             }
     except RecordingError as failure:
         return None, str(failure)
@@ -82,7 +82,7 @@ def label_grasp(path: Path, step: Step) -> tuple[list[Slide] | None, str]:
 def slides_of(labels: Mapping[str, Sequence[Label]]) -> list[Slide]:
     """Return the slides of a hand from the labels of its fingers, in order of time."""
     slips = sorted(
-        ((x.start, x.end, name, x) for name, own in labels.items() for x in own if _is_slip(x)),
+        ((x.start, x.end, name, x) for name, spans in labels.items() for x in spans if _is_slip(x)),
         key=lambda slip: slip[0],
     )
     slides: list[Slide] = []
@@ -116,9 +116,9 @@ def throw_away(path: Path, number: int) -> list[Slide]:
     start, end = slides[number - 1].start - UNSTABLE_MARGIN, slides[number - 1].end
     end += UNSTABLE_MARGIN
     kept = {}
-    for name, own in labels.items():
-        parts = [(x, x.start, min(x.end, start)) for x in own]
-        parts += [(x, max(x.start, end), x.end) for x in own]
+    for name, spans in labels.items():
+        parts = [(x, x.start, min(x.end, start)) for x in spans]
+        parts += [(x, max(x.start, end), x.end) for x in spans]
         cut = [replace(x, start=low, end=high) for x, low, high in parts if low < high]
         kept[name] = tuple(sorted(cut, key=lambda label: label.start))
     _save(recording, kept, path)
@@ -167,10 +167,8 @@ def _figure(hand: HandForce, slide: Slide, title: str) -> str:
             continue
         at = PICTURE_WIDTH * (label.start - start) / (end - start)
         drawn.append(f"<path stroke='{colour}' stroke-dasharray=4 d='M{at:.1f} 0V200'/>")
-        known = escape(label.evidence.partition(";")[0])
-        lines.append(
-            f"<br><b style='color:{colour}'>{escape(name)}</b> {label.start:.2f} s: {known}"
-        )
+        why = escape(label.evidence.partition(";")[0])
+        lines.append(f"<br><b style='color:{colour}'>{escape(name)}</b> {label.start:.2f} s: {why}")
     size = f"width={PICTURE_WIDTH} height={PICTURE_HEIGHT}"
     text = f"{escape(title)}{''.join(lines)}"
     return f"<figure><svg {size}>{''.join(drawn)}</svg><figcaption>{text}</figcaption></figure>"

@@ -72,7 +72,7 @@ class ModuleBuffer:
                 back = kept.astype(readings.dtype)  # comparing int64 with float64 rounds
             # A file has one number type: what does not keep its value in it is not stored.
             nan = self._dtype.kind == "f"
-            if not all(np.array_equal(one, readings, equal_nan=nan) for one in (kept, back)):
+            if not all(np.array_equal(x, readings, equal_nan=nan) for x in (kept, back)):
                 return False
         self._times.append(time)
         self._readings.append(kept)
@@ -89,8 +89,8 @@ class ModuleBuffer:
             steps = np.diff(times, prepend=self._last_popped_time)
             steps = steps[~np.isnan(steps)]  # there is no step before the first sample
             self._steps = np.concatenate([self._steps, steps])[-_N_STEPS:]
-            known = len(self._steps) >= _MIN_STEPS
-            period = float(np.median(self._steps)) if known else 1 / self._sensor.rate
+            is_measured = len(self._steps) >= _MIN_STEPS
+            period = float(np.median(self._steps)) if is_measured else 1 / self._sensor.rate
             self.n_gaps += int((steps > GAP_PERIODS * period).sum())
             self._last_popped_time = self._last_time
         return times, readings
@@ -182,8 +182,8 @@ class ArrivalBuffer:
         if received - self._notice_times.get(text, -math.inf) < MARKER_REPEAT_INTERVAL:
             return
         self._notice_times = {
-            one: when
-            for one, when in self._notice_times.items()
+            note: when
+            for note, when in self._notice_times.items()
             if received - when < MARKER_REPEAT_INTERVAL
         }
         if len(self._notice_times) < MAX_NOTICES:

@@ -46,7 +46,7 @@ class CameraRecorder(Closable):
             refuse_overwrite(path, force=force)
         if is_file := Path(camera).is_file():
             check_video(Path(camera))
-        # What OpenCV prints on stderr would be more than the one line of the error.
+        # OpenCV prints on stderr, which would be more than the one line of the error.
         level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
         self._film = cv2.VideoCapture(int(camera) if camera.isdecimal() else camera)
         is_read, self._picture = self._film.read()

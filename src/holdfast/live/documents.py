@@ -43,14 +43,14 @@ def document_type(
         >>> document_type("Labelled", Weight, "", added=[("label", str)])(1.5, "box")
         Labelled(mass=1.5, label='box')
     """
-    own: list[tuple[Any, ...]] = [
+    renamed_fields: list[tuple[Any, ...]] = [
         (field.name, _nullable(field.type) if nullable(field.name) else field.type)
         for field in fields(value)
     ]
-    index = len(own) if at is None else at
+    index = len(renamed_fields) if at is None else at
     return msgspec.defstruct(
         name,
-        [*own[:index], *added, *own[index:]],
+        [*renamed_fields[:index], *added, *renamed_fields[index:]],
         namespace={"__doc__": description},
         module=__name__,
         frozen=True,

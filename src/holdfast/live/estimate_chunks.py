@@ -84,7 +84,7 @@ class DetectionSummary:
     def __init__(self) -> None:
         self._name = ""
         self._counts: dict[str, _StateCounts] = {}  # of each finger and of the hand
-        self._changes: dict[str, StateChanges] = {}
+        self._changes = StateChanges()
         self._events: dict[str, list[ContactEvent]] = {}
         self.start: float | None = None
         self._watch = SlipWatch()
@@ -126,10 +126,9 @@ class DetectionSummary:
         }
 
     def _add_changes(self, name: str, states: Iterable[tuple[float, ContactState]]) -> None:
-        changes = self._changes.setdefault(name, StateChanges((name,)))
         events = self._events.setdefault(name, [])
         for time, state in states:
-            events += changes.update([state], time)
+            events += self._changes.update({name: state}, time)
 
     def _sorted_events(self) -> list[ContactEvent]:
         return sorted(chain.from_iterable(self._events.values()), key=attrgetter("time"))
@@ -174,7 +173,7 @@ class ChangeLines:
         self.origin = nan
         self._from_first = from_first
         self._hand_only = hand_only
-        self._changes: dict[str, StateChanges] = {}
+        self._changes = StateChanges(LASTING_DURATION)
         # State of each finger, and why it began.
         self._why: dict[str, tuple[ContactState, str]] = {}
         self._watch = SlipWatch()
@@ -189,16 +188,16 @@ class ChangeLines:
         lines: list[tuple[float, str]] = []
         for finger, estimates in chunk.fingers.items():
             for estimate in estimates:
-                # The reason at the change, not that of the sample at which it has lasted.
+                # The reason at the change itself; later the state has lasted, and has another one.
                 if self._why.get(finger, (None,))[0] is not estimate.state:
                     self._why[finger] = estimate.state, why(estimate)
-                for event in self._lasting(finger, estimate.state, estimate.time):
+                for event in self._changes.update({finger: estimate.state}, estimate.time):
                     named = finger, self._why[finger][1]
                     changes.setdefault((event.time, event.state), []).append(named)
             slips = self._watch.update(finger, estimates)
             lines += map(self._slip_line, () if self._hand_only else slips)
         for time, state in chunk.hand:
-            for event in self._lasting(HAND, state, time):
+            for event in self._changes.update({HAND: state}, time):
                 fingers = changes.setdefault((event.time, event.state), [])
                 first_finger, reason = fingers[0] if fingers else ("", "")
                 name = f"{first_finger}, {HAND}" if fingers else HAND
@@ -209,10 +208,6 @@ class ChangeLines:
                     lines.append((time, self._text(time, name, state, reason)))
         lines.sort(key=itemgetter(0))
         return [line for _, line in lines]
-
-    def _lasting(self, name: str, state: ContactState, time: float) -> list[ContactEvent]:
-        changes = self._changes.setdefault(name, StateChanges([name], LASTING_DURATION))
-        return changes.update([state], time)
 
     def _slip_line(self, slip: DetectedSlip) -> tuple[float, str]:
         """Return the time and the line of a slip that has just begun or ended."""

@@ -28,7 +28,7 @@ class HandlingBuffer:
 
     def __init__(self, stream: StreamDetector) -> None:
         self._stream = stream
-        self._modules = {name: ModuleBuffer(one) for name, one in stream.fingers.items()}
+        self._modules = {name: ModuleBuffer(skin) for name, skin in stream.fingers.items()}
         # Held time of each finger, and the time of its last estimate; `put` changes both.
         self._held = dict.fromkeys(stream.fingers, 0.0)
         self._last = dict.fromkeys(stream.fingers, math.nan)

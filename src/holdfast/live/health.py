@@ -1,21 +1,16 @@
-"""Health of the modules of a hand: what ten seconds of an open hand show, and what has changed."""
+"""Health of the modules of a hand, from ten seconds in which the hand is open."""
 
-import json
 import math
-import os
-import re
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import date
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
 
-from holdfast.devices.sources import Source, open_source
+from holdfast.devices.sources import Source
 from holdfast.errors import SourceError
-from holdfast.files import read_input, write_whole
 from holdfast.io.importers.layout_findings import layout_findings
 from holdfast.recordings import GAP_PERIODS, STARTS_LOADED
 from holdfast.sensors import Sensor, taxel_number
@@ -27,16 +22,8 @@ TOUCH_TO_NOISE = 20.0
 """A taxel is touched if it moves against the others by this many times the noise of the module."""
 FIELD_TO_NOISE = 5.0
 """A common field counts from this many times the noise on."""
-NOISIER = 3.0
-"""Ratio of the noise to that of the last check from which a taxel is reported."""
-RATE_CHANGE = 0.05
-"""Share by which a rate differs from that of the last check before it is reported."""
 ROUNDING_NOISE = {"count": 0.3, "N": 1e-6}
-"""Noise below which a taxel is not compared: that of rounding [unit of the readings]."""
-MAX_KEPT = 50
-"""Number of checks of a source that are kept."""
-MAX_HISTORY = 1 << 25
-"""Largest file of checks [bytes]; 50 checks of 368 taxels take 1.2 MB."""
+"""Noise of rounding, below which a taxel is not compared [unit of the readings]."""
 MIN_CHECKED_SAMPLES = 20
 """Samples of a module from which on its health is known."""
 ARRIVAL_TIMEOUT, EXTRA_SECONDS = 0.2, 5.0
@@ -46,7 +33,6 @@ OPEN_SECONDS = 0.5
 TOUCHED_FROM_START = (
     "{} is touched from the start: open the hand, let nothing touch it, and try again"
 )
-TIMES_IN_WORDS = ("two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
 class ModuleHealth(msgspec.Struct, frozen=True):
@@ -141,35 +127,10 @@ def check_health(source: Source, seconds: float) -> HealthCheck:
         # The means in which the touch was found begin earlier.
         n = int(np.searchsorted(times, end - AVERAGED_SECONDS))
         modules[name] = module_health(name, source.sensors[name], times[:n], readings[:n])
-        found = layout_findings(readings[:n], source.sensors[name], modules[name].unit)
-        layout += [f"{name}: {finding.text}" for finding in found]
+        findings = layout_findings(readings[:n], source.sensors[name], modules[name].unit)
+        layout += [f"{name}: {finding.text}" for finding in findings]
     touch = (touched, round(end - first, 1)) if touches else None
     return HealthCheck(date.today().isoformat(), n_lost, modules, touch, tuple(layout))
-
-
-def check_and_keep(
-    uri: str, seconds: float, path: Path
-) -> tuple[HealthCheck, HealthCheck | None, list[str]]:
-    """Check a source, compare it with the last check that a file keeps, and keep this one.
-
-    Args:
-        uri: of the source, or path of a recording.
-        seconds: duration of the check [s].
-        path: of the file.
-
-    Returns:
-        This check, the last one (None if there is none), and what is wrong or has become worse.
-
-    Raises:
-        SourceError: as `check_health`; or the file is none of checks.
-    """
-    earlier = read_history(path)  # a wrong file is refused before a device is awaited
-    with open_source(uri, speed=0) as source:
-        check = check_health(source, seconds)
-    last = earlier[-1] if earlier else None
-    findings = [*check.layout, *changes_since(check, last)]
-    keep(path, earlier, check)
-    return check, last, findings
 
 
 def module_health(name: str, sensor: Sensor, times: Array, readings: Array) -> ModuleHealth:
@@ -307,67 +268,24 @@ def _typical(sensor: Sensor, noise: Array) -> float:
     return max(float(np.median(noise)), ROUNDING_NOISE[sensor.unit])
 
 
-def changes_since(check: HealthCheck, last: HealthCheck | None) -> list[str]:
-    """Return what is wrong, and what has become worse since the last check, one line each."""
-    found = [f"{check.n_lost} packets were lost"] if check.n_lost else []
+def findings_of(check: HealthCheck) -> list[str]:
+    """Return what is wrong, one line each."""
+    findings = [*check.layout, *([f"{check.n_lost} packets were lost"] if check.n_lost else [])]
     if check.touch is not None:
-        found.append(
+        findings.append(
             f"{check.touch[0]} was touched at {check.touch[1]} s: only what precedes was checked"
         )
-    for name, now in check.modules.items():
-        found += [f"taxel {taxel} of {name} is dead" for taxel in now.dead]
-        found += [f"axis {x[-1]} of taxel {x[:-2]} of {name} never changes" for x in now.stuck]
-        if now.n_zeros:
-            share = 100 * now.n_zeros / now.n_samples
-            found.append(f"{name} reads zeros in one taxel in {share:.2g} % of its samples")
-        if len(now.noise) == 1:
-            found.append(f"{name} has one taxel: a field and a touch look the same in it")
-        then = last.modules.get(name) if last else None
-        if last is None or then is None or then.sensor != now.sensor:
-            continue
-        when = date.fromisoformat(last.date)
-        day = f"{when.day} {when:%B}"
-        if abs(now.rate - then.rate) > RATE_CHANGE * then.rate:
-            found.append(f"{name} sends {now.rate:.4g} Hz, {then.rate:.4g} Hz on {day}")
-        levels = [np.sqrt(np.mean(np.square(x.noise), axis=1)) for x in (now, then)]
-        for i, (level, before) in enumerate(zip(*levels, strict=False)):
-            ratio = level / max(before, ROUNDING_NOISE[now.unit])
-            if ratio >= NOISIER:
-                whole = round(ratio)
-                times = TIMES_IN_WORDS[whole - 2] if whole - 2 < len(TIMES_IN_WORDS) else f"{whole}"
-                found.append(
-                    f"taxel {taxel_number(i)} of {name} is {times} times noisier than on {day}"
-                )
-    return found
-
-
-def history_path(source: str) -> Path:
-    """Return the file in which the checks of a source are kept, in the user's state folder."""
-    state = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    name = re.sub(r"[^A-Za-z0-9.-]+", "_", source).strip("_")[-100:]
-    return Path(state) / "holdfast" / "health" / f"{name}.json"
-
-
-def read_history(path: Path) -> list[HealthCheck]:
-    """Return the checks that a file keeps, oldest first; none if it does not exist.
-
-    Raises:
-        SourceError: the file is none of checks.
-    """
-    try:
-        return msgspec.json.decode(read_input(path, MAX_HISTORY), type=list[HealthCheck])
-    except FileNotFoundError:
-        return []
-    except (OSError, ValueError) as cause:
-        why = cause.strerror if isinstance(cause, OSError) else cause
-        raise SourceError(f"{path} is no history of checks: {why}; delete it") from cause
-
-
-def keep(path: Path, history: Sequence[HealthCheck], check: HealthCheck) -> None:
-    """Write the history with a new check."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    kept = [msgspec.to_builtins(each) for each in [*history, check][-MAX_KEPT:]]
-    write_whole(path, json.dumps(kept).encode(), force=True)
+    for name, module in check.modules.items():
+        findings += [f"taxel {taxel} of {name} is dead" for taxel in module.dead]
+        findings += [
+            f"axis {x[-1]} of taxel {x[:-2]} of {name} never changes" for x in module.stuck
+        ]
+        if module.n_zeros:
+            share = 100 * module.n_zeros / module.n_samples
+            findings.append(f"{name} reads zeros in one taxel in {share:.2g} % of its samples")
+        if len(module.noise) == 1:
+            findings.append(f"{name} has one taxel: a field and a touch look the same in it")
+    return findings
 
 
 def table_of(modules: Mapping[str, ModuleHealth]) -> list[tuple[Any, ...]]:

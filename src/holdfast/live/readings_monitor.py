@@ -1,8 +1,7 @@
-"""What the readings show about the sensor, as notices: dead, an axis missing, z inwards. No clock.
+"""Notices about the readings of a finger: an axis missing, z inwards, drift. No clock.
 
-Drift, copies and cross-talk, too. These are no faults, because each can also be right: a sensor
-with a dead band is still at rest, and a hand may hold an object at the start. `holdfast info` finds
-the same in a recording.
+These are no faults, because each can also be right: a hand may hold an object at the start.
+`holdfast info` finds the same in a recording. Readings that never change are the fault `dead`.
 """
 
 import math
@@ -12,14 +11,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, ModuleComparison
 from holdfast.recordings import Recording
 from holdfast.sensors import Sensor
 
+CHECK_INTERVAL = 0.05
+"""Time between the samples that are compared [s]; more would cost time and show nothing else."""
+BLOCK_SECONDS = 1.0
+"""Time over which a force is averaged before its drift is measured [s]."""
+MIN_BLOCKS = 10
+"""Blocks of a hold from which on its drift is known: a skin creeps most in the first seconds."""
+HOLD_SHARE = 0.05
+"""A hold goes on while the force changes by less than this share from block to block."""
 START_NOISE_SECONDS = 0.5
 """Time from the start in which the noise is measured [s]."""
-STILL_SECONDS = 10.0
-"""Time without any change from the start on after which a finger is reported [s]."""
 MOVED_SECONDS = 2.0
 """Time of changed readings after which an axis without any change is reported [s]."""
 SHEAR_STEPS = 20
@@ -36,9 +40,6 @@ DRIFT_SECONDS = 60.0
 DRIFT_SHARE = 0.05
 """Least drift within a minute that is reported, as a share of the load."""
 
-NO_CHANGE = (
-    "no reading has changed since the start: touch the sensor; if that changes none, check it"
-)
 MISSING_AXES = "readings along {} never change: 3 axes are expected, and slip shows in the shear"
 DRIFTS = (
     "the force of this hold drifts by {:.3g} {} a minute, by warming or creep: take a new tare "
@@ -62,50 +63,80 @@ class ReadingsMonitor:
         >>> from holdfast.sensors import sensor
         >>> monitor = ReadingsMonitor({"index": sensor("uskin-4x4")})
         >>> for time in np.arange(0, 12, 0.01):
-        ...     for notice in monitor.update({"index": np.zeros((16, 3))}, time):
+        ...     for notice in monitor.update({"index": np.full((16, 3), [0, 0, time])}, time):
         ...         print(notice[:48])
-        index: no reading has changed since the start: t
+        index: readings along x and y never change: 3 ax
     """
 
     def __init__(self, fingers: Mapping[str, Sensor], *, finds_pull: bool = True) -> None:
         self._fingers = {
             name: _FingerReadings(sensor, finds_pull) for name, sensor in fingers.items()
         }
-        self._comparison = ModuleComparison()
-        self._latest: dict[str, npt.NDArray[Any]] = {}
-        self._instant = -math.inf
 
     def update(self, samples: Mapping[str, npt.NDArray[Any]], time: float) -> list[str]:
         """Look at samples, (n_taxels, 3) by finger, of a time [s]; return new notices."""
-        notices = [
+        return [
             f"{name}: {text}"
             for name, readings in samples.items()
             for text in self._fingers[name].update(readings, time)
         ]
-        if len(self._fingers) > 1:
-            # Modules of one instant may come one by one: the instant before is complete.
-            if time != self._instant and self._comparison.is_due(self._instant):
-                alike = self._comparison.update(self._latest, self._instant)
-                notices += [f"{each.module} {each.text}" for each in alike]
-            self._latest = dict(samples) if time != self._instant else self._latest | dict(samples)
-            self._instant = time
-        return notices
 
     def update_recording(self, part: Recording) -> list[str]:
         """Look at the next part of a recording; return new notices."""
-        alike = self._comparison.update_recording(part)
-        notices = [f"{each.module} {each.text}" for each in alike]
+        notices: list[str] = []
         for name in self._fingers.keys() & part.modules.keys():
             module = part.modules[name]
             stride = max(1, int(CHECK_INTERVAL * module.rate)) if module.n_samples > 1 else 1
             for k in range(0, module.n_samples, stride):
-                notices += [
-                    f"{name}: {text}"
-                    for text in self._fingers[name].update(
-                        module.readings[k], float(module.times[k])
-                    )
-                ]
+                notices += self.update({name: module.readings[k]}, float(module.times[k]))
         return notices
+
+
+class HoldDrift:
+    """Drift of the force of a module in its longest hold so far: creep, or warming.
+
+    Attributes:
+        per_minute: change of the force's amplitude [unit of the readings / min]; NaN without a
+            hold of ten seconds.
+        seconds: duration of that hold [s].
+        load: amplitude of the force at its beginning [unit of the readings].
+
+    Example:
+        >>> drift = HoldDrift()
+        >>> for time in np.arange(0, 30, 0.05):
+        ...     drift.update(np.array([0.0, 0.0, 100.0 + 0.5 * time]), time)
+        >>> round(drift.per_minute, 3), drift.seconds
+        (30.0, 29.0)
+    """
+
+    def __init__(self) -> None:
+        self.per_minute, self.seconds, self.load = math.nan, 0.0, 0.0
+        self._start, self._sum, self._n = -math.inf, np.zeros(3), 0
+        self._first = self._last = 0.0  # amplitudes of the first and of the newest block
+        self._n_blocks, self._moments = 0, np.zeros(3)  # sums of k, of a and of k a
+
+    def update(self, force: npt.NDArray[np.float64], time: float) -> None:
+        """Add a force (3,) since the start [unit of the readings], of a time [s]."""
+        if not self._n or not 0 <= time - self._start < 2 * BLOCK_SECONDS:
+            self._start, self._sum, self._n, self._n_blocks = time, np.zeros(3), 0, 0
+        if time - self._start >= BLOCK_SECONDS:
+            amplitude = float(np.linalg.norm(self._sum / self._n))
+            # A larger change is a new grip, whose drift begins anew.
+            if self._n_blocks and abs(amplitude - self._last) > HOLD_SHARE * self._last:
+                self._n_blocks = 0
+            if not self._n_blocks:
+                self._first, self._moments = amplitude, np.zeros(3)
+            k, self._last = self._n_blocks, amplitude
+            self._moments += (k, amplitude, k * amplitude)
+            self._n_blocks = n = k + 1
+            if n >= MIN_BLOCKS and n * BLOCK_SECONDS > self.seconds:
+                # Least squares: (n sum k a - sum k sum a) / (n sum k^2 - (sum k)^2).
+                sum_k, sum_a, sum_ka = self._moments
+                slope = (n * sum_ka - sum_k * sum_a) / (n * n * (n * n - 1) / 12)
+                self.per_minute = float(slope) * 60 / BLOCK_SECONDS
+                self.seconds, self.load = n * BLOCK_SECONDS, self._first
+            self._start, self._sum, self._n = time, np.zeros(3), 0
+        self._sum, self._n = self._sum + force, self._n + 1
 
 
 class _FingerReadings:
@@ -144,13 +175,12 @@ class _FingerReadings:
         self._moved |= moved
         self._n_moved += bool(np.abs(change).max() > self._least_change)
         self._drift.update(np.einsum("ijk,ik->j", self._sensor.rotations, change), time)
-        found = self._drifting()
-        if not self._moved.any():
-            if time - self._start >= STILL_SECONDS:
-                found.append(NO_CHANGE)
-        elif not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
-            axes = [axis for axis, known in zip("xyz", self._moved, strict=True) if not known]
-            found.append(MISSING_AXES.format(" and ".join(axes)))
+        notices = self._drifting()
+        if not self._moved.all() and self._n_moved * CHECK_INTERVAL >= MOVED_SECONDS:
+            axes = [
+                axis for axis, has_moved in zip("xyz", self._moved, strict=True) if not has_moved
+            ]
+            notices.append(MISSING_AXES.format(" and ".join(axes)))
         normal = float((self._weights * change).sum())
         self._largest = max(self._largest, abs(normal))
         if time - self._start <= START_NOISE_SECONDS:
@@ -164,8 +194,8 @@ class _FingerReadings:
         else:
             self._pulled_since = min(self._pulled_since, time)
             if time - self._pulled_since >= PULL_SECONDS:
-                found.append(PULLED)
-        new = [text for text in found if text not in self._reported]
+                notices.append(PULLED)
+        new = [text for text in notices if text not in self._reported]
         self._reported.update(new)
         return new
 

@@ -409,7 +409,7 @@ class SessionRecorder:
 def _file_id(path: Path) -> tuple[int, int] | None:
     """Return device and inode of the file at `path`; None if there is none."""
     try:
-        found = path.stat()
+        status = path.stat()
     except OSError:
         return None
-    return found.st_dev, found.st_ino
+    return status.st_dev, status.st_ino

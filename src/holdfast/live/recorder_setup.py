@@ -85,7 +85,6 @@ def create_recorder(
     path: Path,
     metadata: Mapping[str, Any],
     *,
-    fingers_only: bool = False,
     force: bool = False,
     fsync: bool = False,
 ) -> Recorder:
@@ -95,29 +94,19 @@ def create_recorder(
         source: whose modules and metadata are recorded.
         path: from `recording_path`.
         metadata: of the user; they outrank those of the source.
-        fingers_only: leave out pads and palm.
         force: replace an existing file.
         fsync: as in `Recorder`.
 
     Raises:
-        SourceError: the source has no fingers.
         OutputError: the file cannot be written.
     """
-    # Pads and patches of the palm have a name with a slash.
-    sensors = {
-        name: sensor
-        for name, sensor in source.sensors.items()
-        if not (fingers_only and "/" in name)
-    }
-    if not sensors:
-        raise SourceError(f"no fingers to record: {source.name} has {', '.join(source.sensors)}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as cause:
         raise OutputError(f"cannot write to {path.parent}: {cause.strerror}") from cause
     recorded_at = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
     facts = {**source.metadata, "recorded_at": recorded_at, **metadata}
-    return Recorder(path, sensors, metadata=facts, force=force, fsync=fsync)
+    return Recorder(path, source.sensors, metadata=facts, force=force, fsync=fsync)
 
 
 @contextmanager
@@ -142,25 +131,22 @@ def recording(source: Source, recorder: Recorder) -> Iterator[None]:
         raise SourceError(f"{source.name} sent no samples: nothing was recorded")
 
 
-def typed_metadata(
-    object_name: str, case: str, note: str, settings: Sequence[str]
-) -> dict[str, Any]:
+def typed_metadata(object_name: str, case: str, settings: Sequence[str]) -> dict[str, Any]:
     """Return the metadata that a user typed; of `settings`, texts of numbers become numbers.
 
     Args:
         object_name: name of the object.
         case: of the experiment.
-        note: about the recording.
         settings: other metadata, each as `KEY=VALUE`.
 
     Raises:
         ValueError: a setting has another form, or its key is given twice.
 
     Example:
-        >>> typed_metadata("can", "", "", ["mass=0.25", "by=Ann"])
+        >>> typed_metadata("can", "", ["mass=0.25", "by=Ann"])
         {'object': 'can', 'mass': 0.25, 'by': 'Ann'}
     """
-    pairs: dict[str, Any] = {"object": object_name, "case": case, "note": note}
+    pairs: dict[str, Any] = {"object": object_name, "case": case}
     pairs = {key: text for key, text in pairs.items() if text}
     for pair in settings:
         key, equals, text = pair.partition("=")

@@ -9,7 +9,6 @@ from concurrent.futures import Future
 from contextlib import ExitStack, contextmanager
 from math import isclose
 from threading import Event, Lock, Thread
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -94,7 +93,7 @@ class InterpreterSettings:
         with self._lock:
             if not self._n_users:
                 self._before = sys.getswitchinterval()
-                # What the program froze itself would be thawed by `end`: then nothing is frozen.
+                # `end` would thaw objects that the program itself froze: then nothing is frozen.
                 self._freezes = gc.get_freeze_count() <= MAX_FROZEN_BY_PYTHON
                 sys.setswitchinterval(SWITCH_INTERVAL)
             self._n_users += 1
@@ -138,8 +137,8 @@ class TimedUpdate(NamedTuple):
 class Session:
     """Run a stream detector in its own thread. Leaving it as a context manager stops it.
 
-    It keeps the newest updates, which other threads read at their own pace: a reader that is too
-    slow misses some, and delays nobody. Listeners are called in the thread of the session, one
+    It keeps the newest updates, which other threads read at their own pace: a slow reader misses
+    updates, and delays no other thread. Listeners are called in the thread of the session, one
     after the other. They must return at once.
 
     Args:
@@ -217,12 +216,7 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def change(self, work: Work, consequence: str) -> None:
@@ -247,10 +241,10 @@ class Session:
 
     def latency(self) -> Latency:
         """Compute the percentiles of the newest latencies."""
-        known = self._latencies[: min(self._n_latencies, MAX_LATENCIES)]
-        if not len(known):
+        latencies = self._latencies[: min(self._n_latencies, MAX_LATENCIES)]
+        if not len(latencies):
             return Latency(np.nan, np.nan, np.nan)
-        return Latency(*np.percentile(known, (50, 99, 100)).tolist())
+        return Latency(*np.percentile(latencies, (50, 99, 100)).tolist())
 
     def _run(self) -> None:
         try:

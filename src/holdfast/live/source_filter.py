@@ -69,8 +69,8 @@ def measure_hold(arrivals: Iterable[Arrival], fingers: Mapping[str, Sensor], rat
         samples = [arrival.samples[name] for arrival in arrivals if name in arrival.samples]
         if samples:
             rows.append(held_rows(np.array(samples), sensor, rate))
-    known = [n_rows for n_rows in rows if n_rows is not None]
-    return float(np.median(known)) if min(known, default=1.0) > 1.0 else 1.0
+    counted_rows = [n_rows for n_rows in rows if n_rows is not None]
+    return float(np.median(counted_rows)) if min(counted_rows, default=1.0) > 1.0 else 1.0
 
 
 class RateMonitor:

@@ -60,7 +60,7 @@ class StatusPublisher:
         for estimate, _ in estimates:
             for problem in self._faults.update(estimate):
                 self.add_notice(problem.text)
-        own = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
+        service_notices = [self._own_notices.popleft() for _ in range(len(self._own_notices))]
         if estimates:
             self._newest = estimates[-1].estimate
             self._update_taxels([update for _, update in updates])
@@ -77,9 +77,9 @@ class StatusPublisher:
                 times=[estimate.time for estimate, _ in estimates],
                 fingers={n: _finger_series(estimates, n) for n in self._session.stream.fingers},
             ),
-            events=[schema.EventDocument(*event) for _, one in updates for event in one.events],
+            events=[schema.EventDocument(*event) for _, timed in updates for event in timed.events],
             notices=[
-                *own,
+                *service_notices,
                 *(
                     schema.Notice(when, text)
                     for when, update in updates

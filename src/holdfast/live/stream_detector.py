@@ -151,7 +151,7 @@ class StreamDetector:
         self._new_detector(100.0)  # at any rate: it raises for wrong arguments
         self.set_threshold(None)
         self._last: HandEstimate | None = None  # from the readings alone, without `hidden`
-        self._changes = StateChanges((*self.fingers, HAND))
+        self._changes = StateChanges()
         # A source slower than real time sends its samples later; a faster one keeps the timeout.
         self._slowdown = 1 / min(source.speed or 1.0, 1.0)
         self._last_sample_at = time.monotonic()
@@ -176,7 +176,7 @@ class StreamDetector:
         Raises:
             ValueError: the duration is negative or not finite.
         """
-        lasting = StateChanges((*self.fingers, HAND), min_duration)
+        lasting = StateChanges(min_duration)
         for estimate in self:
             yield from lasting.update(_states(estimate), estimate.time)
 
@@ -246,10 +246,10 @@ class StreamDetector:
         Raises:
             ValueError: the threshold is not from 0 to 1.
         """
-        own = {
+        limits = {
             name: self.model.finger(name, s).stable.threshold for name, s in self.fingers.items()
         }
-        thresholds = own if threshold is None else dict.fromkeys(own, threshold)
+        thresholds = limits if threshold is None else dict.fromkeys(limits, threshold)
         check_thresholds(thresholds)
         if self._detector is not None:
             self._detector.set_thresholds(thresholds)
@@ -331,6 +331,6 @@ class StreamDetector:
         return StreamUpdate(arrival, estimates, events)
 
 
-def _states(estimate: HandEstimate) -> list[ContactState]:
+def _states(estimate: HandEstimate) -> dict[str, ContactState]:
     """Return the states of the fingers, then that of the hand."""
-    return [*(finger.state for finger in estimate.fingers.values()), estimate.state]
+    return {name: f.state for name, f in estimate.fingers.items()} | {HAND: estimate.state}

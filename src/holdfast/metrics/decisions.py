@@ -27,7 +27,7 @@ class FingerDecisions:
         labels: (n,) codes of the labelled states; UNKNOWN without a label.
         states: (n,) codes of the decided states.
         stable_probability: (n,) probability that the contact is stable; NaN if the state is
-            UNKNOWN. All NaN for a hand, whose state follows from those of its fingers.
+            UNKNOWN. All NaN for a hand: its state follows from the states of its fingers.
         exact_labels: (n,) codes of the states by the truth, or by a rule without its margin; None
             if neither is known. Events are found in them, because a person draws labels with a
             margin around a disturbance.
@@ -86,7 +86,7 @@ class Decisions:
 
     @classmethod
     def of(cls, name: str, fingers: Mapping[str, FingerDecisions], n_model_fingers: int) -> Self:
-        """Return the decisions of a recording; those of the hand follow from the fingers."""
+        """Return the decisions about the fingers and the hand of a recording."""
         return cls(name, fingers, hand_decisions(fingers, n_model_fingers))
 
     @property
@@ -125,10 +125,10 @@ def hand_decisions(fingers: Mapping[str, FingerDecisions], n_model_fingers: int)
         # (n_fingers, n) latest value of each finger at each instant: index 0, before its first
         # sample, is UNKNOWN, or not dead.
         table = np.zeros((len(hand), len(times)), dtype=np.int8)
-        for row, finger, own in zip(table, hand, values, strict=True):
-            if own is not None:
+        for row, finger, finger_values in zip(table, hand, values, strict=True):
+            if finger_values is not None:
                 at = np.searchsorted(finger.times, times, side="right")
-                row[:] = np.concatenate([[UNKNOWN], own])[at]
+                row[:] = np.concatenate([[UNKNOWN], finger_values])[at]
         return table
 
     def of_hand(codes: Sequence[Codes], dead: Flags) -> Codes:

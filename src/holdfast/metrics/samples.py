@@ -17,7 +17,7 @@ from holdfast.sensors.types import Array, Integers
 N_CALIBRATION_BINS = 10
 """Number of bins of probabilities from 0 to 1."""
 MAX_LOG_ODDS = 40.0
-"""Log odds at the first and the last bin; those of float64 end at 37."""
+"""Log odds at the first and the last bin; log odds of float64 end at 37."""
 BINS_PER_UNIT = 50
 """Number of bins for each unit of the log odds."""
 N_BINS = int(2 * MAX_LOG_ODDS * BINS_PER_UNIT) + 1
@@ -217,9 +217,9 @@ def score_samples(
     check_lengths(labels=label, states=state, stable_probability=score)
     # What is left out of a numerator is left out of the denominator: undecided samples are counted
     # beside all ratios, never as wrong or right.
-    known = (label != UNKNOWN) & (state != UNKNOWN)
+    is_decided = (label != UNKNOWN) & (state != UNKNOWN)
     n_undecided = int(((label != UNKNOWN) & (state == UNKNOWN)).sum())
-    label, state, score = label[known], state[known], score[known]
+    label, state, score = label[is_decided], state[is_decided], score[is_decided]
     if n_missing := int(np.isnan(score).sum()):
         raise ValueError(f"{n_missing} decided samples have NaN for stable_probability")
     truth, decision = label == STABLE, state == STABLE
@@ -295,8 +295,8 @@ def calibration_sums(decisions: Sequence[FingerDecisions]) -> Array:
         (10, 3) for each bin of probabilities: their sum, the number of samples labelled stable, and
         the number of all samples. The sums of several recordings can be added.
     """
-    known = [(finger.labels != UNKNOWN) & (finger.states != UNKNOWN) for finger in decisions]
-    pairs = list(zip(decisions, known, strict=True))
+    is_decided = [(finger.labels != UNKNOWN) & (finger.states != UNKNOWN) for finger in decisions]
+    pairs = list(zip(decisions, is_decided, strict=True))
     score = np.concatenate([np.empty(0), *(f.stable_probability[rows] for f, rows in pairs)])
     stable = np.concatenate([np.empty(0), *(f.labels[rows] == STABLE for f, rows in pairs)])
     bins = np.clip((score * N_CALIBRATION_BINS).astype(int), 0, N_CALIBRATION_BINS - 1)

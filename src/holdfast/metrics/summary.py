@@ -263,8 +263,8 @@ class ResultTotal:
         if results.hand is not None:
             group.hand.append(results.hand)
         for name, counts in results.slips.items():
-            known = [self.slips[name]] if name in self.slips else []
-            self.slips[name] = SlipCounts.total([*known, counts])
+            before = [self.slips[name]] if name in self.slips else []
+            self.slips[name] = SlipCounts.total([*before, counts])
             group.slips = SlipCounts.total([group.slips, counts])
         for name, samples in results.samples.items():
             part = BinnedSamples.of(samples) if self.binned else samples
@@ -277,7 +277,7 @@ class ResultTotal:
                 total.bin()
 
     def metrics(self, n_resamples: int = 1000, seed: int = 0) -> Metrics:
-        """Compute the metrics; the arguments are those of `summarise`."""
+        """Compute the metrics; for the arguments see `summarise`."""
         curves = [group.slips.as_curve for group in self.groups] if self.slips else []
         slips = slip_intervals(curves, n=n_resamples, seed=seed)
         return Metrics(

@@ -25,7 +25,7 @@ from holdfast.contact import (
     Phase,
 )
 from holdfast.metrics.masks import Mask, join_runs, runs, runs_with, widen_runs, without_short_runs
-from holdfast.recordings import Label, Recording, Truth, cut_labels, labels_from_samples
+from holdfast.recordings import Label, Recording, Truth, labels_from_samples
 from holdfast.sensors.types import Array
 
 Onsets = Literal["truth", "labels", "rule", "mixed"]
@@ -123,7 +123,7 @@ def labels_from_truth(
     lost = was_held & ~np.logical_or.accumulate(phase == Phase.RELEASED) & free
     # The first rule that applies decides. Instability outranks loss of contact: a finger that is
     # thrown off the object for a moment is disturbed. Contact outranks the phases that follow: a
-    # finger that does not touch has no state of its own. The last one is what is left.
+    # finger that does not touch has no state of its own. The last rule takes all other samples.
     unstable_by = ContactState.UNSTABLE
     rules = (
         (unstable & sliding, (unstable_by, Cause.SLIP)),
@@ -143,24 +143,6 @@ def labels_from_truth(
     return labels_from_samples(times, states, period=period, evidence="truth", author="twin")
 
 
-def relabel(recording: Recording, rule: LabelRule) -> Recording:
-    """Return the recording with labels made from its truth.
-
-    Fingers without a truth keep their labels. Labels are cut to the samples: a sensor may start
-    later than the truth.
-
-    Args:
-        recording: to label.
-        rule: thresholds and margins.
-    """
-    labels = labels_by_truth(recording, rule)
-    modules = {
-        name: replace(module, labels=cut_labels(labels[name], module)) if name in labels else module
-        for name, module in recording.modules.items()
-    }
-    return replace(recording, modules=modules) if labels else recording
-
-
 def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[Label, ...]]:
     """Return the labels of each finger whose truth is known; none without a truth.
 
@@ -168,8 +150,8 @@ def labels_by_truth(recording: Recording, rule: LabelRule) -> dict[str, tuple[La
         recording: with the truth.
         rule: thresholds and margins.
     """
-    truth, known = recording.truth, fingers_with_truth(recording)
-    return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in known}
+    truth, names = recording.truth, fingers_with_truth(recording)
+    return {} if truth is None else {name: labels_from_truth(truth, name, rule) for name in names}
 
 
 def labels_by_rule(labels: Sequence[Label]) -> bool:

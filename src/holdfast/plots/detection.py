@@ -51,7 +51,7 @@ def plot_detection(detection: Detection, axes: Sequence[Axes] | None = None) -> 
         The axes, one for each finger, to add lines and texts to.
 
     Raises:
-        ValueError: the number of axes is not that of the fingers.
+        ValueError: there are not as many axes as fingers.
     """
     if axes is None:
         from matplotlib import pyplot as plt

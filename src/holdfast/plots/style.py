@@ -1,7 +1,7 @@
 """Style that all figures share: sizes, colours, axes and legends. No screen is needed."""
 
 import io
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal, NamedTuple
 
@@ -9,9 +9,8 @@ import matplotlib as mpl
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE, Phase
+from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
 from holdfast.plots import COLOURS
 
 PAGE_WIDTH = 7.2
@@ -28,14 +27,6 @@ MARKERS = "osD^vP"
 COMPONENT_COLOURS = {"F_x": "#0072B2", "F_y": "#E69F00", "F_z": "#CC79A7", "F_a": "#000000"}
 STATE_COLOURS = {STABLE: "#009e73", UNSTABLE: "#e08a3c", NO_CONTACT: "#c8c8c8"}
 """Colour of each contact state, by its code."""
-PHASE_COLOURS = {
-    Phase.FREE: "#eeeeee",
-    Phase.CLOSING: "#fbe3b5",
-    Phase.LOCKED: "#c9ead9",
-    Phase.DISTURBED: "#cfe6f7",
-    Phase.SLIPPING: "#f6cdb6",
-    Phase.RELEASED: "#e6d8ec",
-}
 
 PAPER = "the paper"
 """Name of the series with the paper's values; it is black and dashed in every figure."""
@@ -54,8 +45,8 @@ class SeriesStyle(NamedTuple):
 def series_styles(names: Iterable[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name, in the order of first appearance.
 
-    Eighteen styles differ in colour, marker or dashes; then they repeat. The paper's series has
-    its own style, which does not shift those of the others.
+    Eighteen styles differ in colour, marker or dashes; then they repeat. The paper's series has a
+    style of its own; the other series keep theirs.
     """
     styles: dict[str, SeriesStyle] = {}
     others = [name for name in dict.fromkeys(names) if name != PAPER]
@@ -98,7 +89,7 @@ def page_figure(height: float, width: float = PAGE_WIDTH) -> PageFigure:
 
     Args:
         height: of the figure [inch].
-        width: of the figure [inch]; by default that of a page.
+        width: of the figure [inch]; by default the width of a page.
     """
     return PageFigure(figsize=(width, height), dpi=200, layout="constrained")
 
@@ -166,24 +157,3 @@ def add_legend(
         handles=handles, loc=location, ncols=-(-len(handles) // n_lines),
         fontsize=FONT_SIZE, frameon=False, handlelength=2.8, columnspacing=1.3, borderaxespad=0.3,
     )  # fmt: skip
-
-
-def legend_handles(
-    styles: Mapping[str, SeriesStyle], groups: Iterable[Collection[str]], *, lines: bool = True
-) -> list[Line2D]:
-    """Return legend handles for the names that appear in some group; they have no formulas.
-
-    Args:
-        styles: of all names.
-        groups: the names that each panel shows.
-        lines: whether a handle shows a line beside the marker.
-    """
-    shown = set().union(*groups)
-    return [
-        Line2D(
-            [], [], color=style.color, marker=style.marker, markersize=4, linewidth=1.1,
-            linestyle=style.linestyle if lines else "", label=literal(name),
-        )
-        for name, style in styles.items()
-        if name in shown
-    ]  # fmt: skip

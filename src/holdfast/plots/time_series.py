@@ -9,13 +9,11 @@ import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from holdfast.contact import Phase
 from holdfast.detection import DEFAULT_WINDOW, FEATURE_NAMES, Tare
 from holdfast.detection.features import stretch_features, tared_force
-from holdfast.plots.style import COMPONENT_COLOURS, FONT_SIZE, INK, PHASE_COLOURS
+from holdfast.plots.style import COMPONENT_COLOURS, INK
 from holdfast.recordings import Recording
 from holdfast.sensors.types import Array
 
@@ -25,8 +23,6 @@ LOG_SCALE_RATIO = 15.0
 """Sigma has a logarithmic axis if its maximum is this many times its median."""
 N_STRETCHES = 1500
 """Number of stretches of a long curve; the minimum and the maximum of each are drawn."""
-LETTER_WIDTH = 0.0083
-"""Width of a letter of a phase's name, as a fraction of the width of the axes."""
 
 
 class FingerSeries(NamedTuple):
@@ -174,38 +170,16 @@ def draw_components(axes: Axes, series: FingerSeries) -> None:
 def draw_sigma(axes: Axes, series: FingerSeries) -> None:
     """Draw sigma; on a logarithmic axis if peaks would flatten everything else."""
     draw_curve(axes, series, series.sigma, INK, 0.8)
-    known = series.sigma[np.isfinite(series.sigma) & (series.sigma > 0)]
-    if not len(known) or known.max() <= LOG_SCALE_RATIO * np.median(known):
+    sigma = series.sigma[np.isfinite(series.sigma) & (series.sigma > 0)]
+    if not len(sigma) or sigma.max() <= LOG_SCALE_RATIO * np.median(sigma):
         axes.set_ylim(bottom=0)
         axes.yaxis.set_major_locator(MaxNLocator(4))
         return
     # From the 0.5 % quantile: single values near 0 would take most of a logarithmic axis.
     axes.set_yscale("log", nonpositive="clip")
-    axes.set_ylim(np.quantile(known, 0.005) / 1.5, known.max() * 1.5)
+    axes.set_ylim(np.quantile(sigma, 0.005) / 1.5, sigma.max() * 1.5)
     axes.yaxis.set_major_locator(LogLocator(numticks=4))
     axes.yaxis.set_minor_locator(NullLocator())
-
-
-def shade_phases(axes: Axes, series: FingerSeries, *, named: bool = False) -> None:
-    """Shade each phase.
-
-    Args:
-        axes: to draw on.
-        series: with phases.
-        named: write the name above each phase that is wide enough.
-    """
-    spans = list(equal_spans(series.times, series.phases))
-    duration = spans[-1][2] - spans[0][1] if spans else 1.0
-    for first, start, end in spans:
-        name = str(series.phases[first])
-        if not name:
-            continue
-        axes.axvspan(start, end, facecolor=PHASE_COLOURS[Phase(name)], linewidth=0, zorder=0)
-        if named and (end - start) / duration > LETTER_WIDTH * (len(name) + 1):
-            axes.annotate(
-                name, ((start + end) / 2, 1), xycoords=("data", "axes fraction"),
-                xytext=(0, 2), textcoords="offset points", ha="center", fontsize=FONT_SIZE - 0.5,
-            )  # fmt: skip
 
 
 def equal_spans(times: Array, values: npt.NDArray[Any]) -> Iterator[tuple[int, float, float]]:
@@ -237,13 +211,3 @@ def component_handles(names: Iterable[str] = ("F_x", "F_y", "F_z")) -> list[Arti
 def line_handle(colour: str, label: str) -> Line2D:
     """Return the legend handle of a curve."""
     return Line2D([], [], color=colour, linewidth=1.4, label=label)
-
-
-def phase_handles(series: FingerSeries) -> list[Artist]:
-    """Return the legend handles of the phases of a series."""
-    present = set(series.phases.tolist())
-    return [
-        Patch(facecolor=colour, label=str(phase))
-        for phase, colour in PHASE_COLOURS.items()
-        if phase in present
-    ]

@@ -209,7 +209,7 @@ SENSORS_BY_MAKER: dict[str, dict[str, Callable[[], Sensor]]] = {
     "Robotera": {"xhand": partial(_grid, "xhand", (10, 12), (2e-3,) * 2, 60.0)},
 }
 """Functions that make the built-in sensors, by maker and name."""
-SENSORS = {name: make for own in SENSORS_BY_MAKER.values() for name, make in own.items()}
+SENSORS = {name: make for makers in SENSORS_BY_MAKER.values() for name, make in makers.items()}
 """The same by name."""
 HANDS = {"allegro-uskin": allegro_uskin}
 """Functions that make the built-in hands, by name."""

@@ -152,16 +152,16 @@ class Sensor:
         """Return whether two sensors are the same, but for the last digits of numbers."""
         if self is other or not isinstance(other, Sensor):
             return self is other
-        own, given = (
+        fields_of_self, fields_of_other = (
             (x.name, x.n_taxels, x.unit, x.range, x.magnetic, x.step, x.rests_at_zero)
             for x in (self, other)
         )
         return (
-            own == given
+            fields_of_self == fields_of_other
             and abs(self.rate - other.rate) <= EQUAL_TOLERANCE * self.rate
             and all(
-                np.abs(one - two).max() <= EQUAL_TOLERANCE
-                for one, two in (
+                np.abs(mine - two).max() <= EQUAL_TOLERANCE
+                for mine, two in (
                     (self.positions, other.positions),
                     (self.rotations, other.rotations),
                     (self.normal, other.normal),
@@ -202,9 +202,9 @@ class Sensor:
         """
         data = with_range(data)
         needed = {"name", "positions", "rotations", "normal", "rate"}
-        known = needed | {"unit", "range", "magnetic", "step", "rests_at_zero"}
-        if unknown := sorted(set(data) - known):
-            raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(known)}")
+        allowed = needed | {"unit", "range", "magnetic", "step", "rests_at_zero"}
+        if unknown := sorted(set(data) - allowed):
+            raise ValueError(f"unknown fields {unknown} in a sensor; it has {sorted(allowed)}")
         if missing := sorted(needed - set(data)):
             raise ValueError(f"fields {missing} are missing in a sensor; it needs {sorted(needed)}")
         return cls(**{**data, "name": str(data["name"]), "rate": float(data["rate"])})
@@ -377,9 +377,9 @@ def _plain(part: object) -> object:
     return part
 
 
-def _array(given: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Array:
+def _array(values: npt.ArrayLike, what: str, shape: tuple[int | None, ...]) -> Array:
     try:
-        array = np.array(given, dtype=np.float64)
+        array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as cause:
         raise ValueError(f"{what}: numbers in a regular array expected") from cause
     matches = array.ndim == len(shape) and all(

@@ -56,20 +56,20 @@ def module_sensors(model: str, n_taxels: int) -> dict[str, Sensor]:
     if n_taxels < 1:
         raise ValueError(f"{model or 'a sensor'} with {n_taxels} taxels given; at least 1 expected")
     # A whole hand first: its model has no sensor of its own.
-    known: Hand | Sensor | None = whole_hand(model)
-    if known is None and model.lower() in XELA_SENSORS:
-        known = sensor(XELA_SENSORS[model.lower()])
-    if known is None:
+    skin: Hand | Sensor | None = whole_hand(model)
+    if skin is None and model.lower() in XELA_SENSORS:
+        skin = sensor(XELA_SENSORS[model.lower()])
+    if skin is None:
         if not model and n_taxels in SENSOR_BY_N_TAXELS:
             return {"": sensor(SENSOR_BY_N_TAXELS[n_taxels])}
         return {"": flat_grid(model.lower() or "unknown", n_taxels)}
-    if n_taxels != known.n_taxels:
+    if n_taxels != skin.n_taxels:
         raise ValueError(
-            f"{n_taxels} taxels given, {known.n_taxels} expected ({model}: {known.name})"
+            f"{n_taxels} taxels given, {skin.n_taxels} expected ({model}: {skin.name})"
         )
-    if isinstance(known, Sensor):
-        return {"": known}
-    return {name: module.sensor for name, module in known.modules.items()}
+    if isinstance(skin, Sensor):
+        return {"": skin}
+    return {name: module.sensor for name, module in skin.modules.items()}
 
 
 def is_known(model: str) -> bool:
@@ -85,8 +85,8 @@ def whole_hand(model: str) -> Hand | None:
 
 def split(model: str, flat: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
     """Split (..., n_taxels, 3) readings of a device into modules, as in `module_sensors`."""
-    known = whole_hand(model)
-    return {"": flat} if known is None else known.split(flat)
+    hand_of_model = whole_hand(model)
+    return {"": flat} if hand_of_model is None else hand_of_model.split(flat)
 
 
 def flat_grid(name: str, n_taxels: int) -> Sensor:

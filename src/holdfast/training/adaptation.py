@@ -36,7 +36,7 @@ BOLD: tuple[Parameters, ...] = (
 
 
 class Adaptation(NamedTuple):
-    """What is taken over from the labels.
+    """Parameters that are adapted to the labels.
 
     Attributes:
         parameters: of `Adapted`.
@@ -106,8 +106,10 @@ def choose_adaptation(
     # What is alike within a grasp is alike for all its samples: errors are counted by recording, of
     # few recordings by block of time.
     units = recordings if many else TIME_FOLDS * recordings + blocks
-    known = ~np.isnan(losses[0])
-    by_unit = [losses[:, known & (units == unit)].mean(axis=1) for unit in np.unique(units[known])]
+    is_scored = ~np.isnan(losses[0])
+    by_unit = [
+        losses[:, is_scored & (units == unit)].mean(axis=1) for unit in np.unique(units[is_scored])
+    ]
     table = np.array(by_unit).reshape(-1, len(candidates)).T
     chosen = choose_nearest(table)
     mean = table.mean(axis=1) if table.size else np.zeros(len(candidates))
@@ -159,10 +161,10 @@ def adaptation_warnings(init: Model, scan: DatasetScan, fingers: Collection[str]
             f"{', '.join(names)}: the sensor is {used}, {name} was trained on "
             f"{expected}; its features are used unchanged, its weights may not fit"
         )
-    if known := known_recordings(init, scan):
-        first = ", ".join(known[:3]) + (" ..." if len(known) > 3 else "")
+    if seen_names := known_recordings(init, scan):
+        first = ", ".join(seen_names[:3]) + (" ..." if len(seen_names) > 3 else "")
         yield (
-            f"{name} was trained on {len(known)} of these {len(scan.recordings)} recordings "
+            f"{name} was trained on {len(seen_names)} of these {len(scan.recordings)} recordings "
             f"({first}): the metrics on them are too good"
         )
 

@@ -208,11 +208,13 @@ def combine_scans(
     for recording, sensors_of_recording in scans:
         scanned.append(recording)
         for finger, sensor in sensors_of_recording.items():
-            known = sensors.setdefault(finger, sensor)
-            smallest = min(smallest or sensor, sensor, key=lambda each: each.n_taxels)
+            first_sensor = sensors.setdefault(finger, sensor)
+            smallest = min(smallest or sensor, sensor, key=lambda x: x.n_taxels)
             # Relative features carry over between sensors; the others are numbers of one sensor.
-            if not relative and sensor != known:
-                texts = [f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, known)]
+            if not relative and sensor != first_sensor:
+                texts = [
+                    f"{s.name} ({s.n_taxels} taxels, {s.unit})" for s in (sensor, first_sensor)
+                ]
                 layout = "" if texts[0] != texts[1] else " with another layout or rate"
                 raise TrainingError(
                     f"{finger} of {recording.name!r} has the sensor {texts[0]}, other recordings "

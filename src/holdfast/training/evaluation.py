@@ -68,14 +68,14 @@ def compute_decisions_and_tare(model: Model, recording: Recording) -> tuple[Deci
     # ones have it, so that an onset is where the rule saw it.
     labels = {name: module.labels for name, module in recording.modules.items()} | by_truth
     by_rule = any(map(labels_by_rule, labels.values()))
-    exact = {name: without_margin(own) for name, own in labels.items()} if by_rule else by_truth
+    exact = {name: without_margin(x) for name, x in labels.items()} if by_rule else by_truth
     fingers = {}
     for name, trace in detection.fingers.items():
         head, slip = model.finger(name).slip, None
         if head is not None and trace.slip_probability is not None:
             # Quiet hold, in which nothing may be reported, is where the true label is STABLE.
-            known = by_truth.get(name)
-            quiet = None if known is None else label_states(known, trace.times) == STABLE
+            spans = by_truth.get(name)
+            quiet = None if spans is None else label_states(spans, trace.times) == STABLE
             slip = SlipDecisions(
                 trace.times,
                 trace.slip_probability,
@@ -112,10 +112,10 @@ def was_tuned_on(model: Model, recording: Recording) -> bool:
     return _is_among(recording, chosen)
 
 
-def _is_among(recording: Recording | ScannedRecording, known: Iterable[Mapping[str, str]]) -> bool:
+def _is_among(recording: Recording | ScannedRecording, models: Iterable[Mapping[str, str]]) -> bool:
     """Return whether one of the digests is known; older models have those with the times."""
     digests = {recording.digest, recording.readings_digest}
-    return any(not digests.isdisjoint(recordings.values()) for recordings in known)
+    return any(not digests.isdisjoint(recordings.values()) for recordings in models)
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ class Evaluation:
 
     @property
     def verdict(self) -> str | None:
-        """What the model is worth; None if it was trained on all labelled recordings."""
+        """The verdict on the model; None if it was trained on all labelled recordings."""
         n, n_unseen = len(self.metrics.recordings), len(self.unseen.recordings)
         if self.trained_on and self.unseen.pooled.n + self.unseen.pooled.n_undecided == 0:
             return None
@@ -170,12 +170,11 @@ def evaluate(
         model: to evaluate.
         recordings: labelled; of an iterator, they are evaluated in this process.
         seed: of the bootstrap.
-        engine: that reads the recordings. On a cluster, all machines need the recordings at the
-            same paths.
+        engine: that reads the recordings.
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: the engine cannot be used.
+        EngineError: a process died.
     """
     model = Model.of(model)
     if isinstance(recordings, Sequence):
@@ -204,7 +203,7 @@ def evaluate_recordings(
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: the engine cannot be used.
+        EngineError: a process died.
     """
     parts = ((OneRecording(recordings, index),) for index in range(len(recordings)))
     trained_on: list[str] = []
@@ -249,8 +248,8 @@ def _evaluate_part(
     """Return results, where the recording comes from, and the decisions if they are kept."""
     (recording,) = part
     decisions, loaded = compute_decisions_and_tare(model, recording)
-    known, tuned_on = was_trained_on(model, recording), was_tuned_on(model, recording)
-    origin = _Origin(recording.readings_digest, loaded, known, tuned_on)
+    trained, tuned_on = was_trained_on(model, recording), was_tuned_on(model, recording)
+    origin = _Origin(recording.readings_digest, loaded, trained, tuned_on)
     return score_recording(decisions), origin, [decisions] if keep else []
 
 
@@ -270,16 +269,16 @@ def _combined_slips(
 
     Samples of unit -1 have no decision, and no truth: models were trained beside them.
     """
-    known = [slip for slip in decisions if slip is not None]
-    if not known or len(known) < len(decisions):
+    slips = [slip for slip in decisions if slip is not None]
+    if not slips or len(slips) < len(decisions):
         return None
-    every, left_out, truth = np.arange(len(unit)), unit < 0, known[0].truth
-    probability = np.stack([slip.probability for slip in known])[unit, every]
+    every, left_out, truth = np.arange(len(unit)), unit < 0, slips[0].truth
+    probability = np.stack([slip.probability for slip in slips])[unit, every]
     return replace(
-        known[0],
+        slips[0],
         probability=np.where(left_out, np.nan, probability),
-        raised=np.stack([slip.raised for slip in known])[unit, every] & ~left_out,
-        truth=None if truth is None else truth_without(known[0].times, truth, left_out),
+        raised=np.stack([slip.raised for slip in slips])[unit, every] & ~left_out,
+        truth=None if truth is None else truth_without(slips[0].times, truth, left_out),
     )
 
 
@@ -288,7 +287,7 @@ def combine_decisions(
 ) -> Decisions:
     """Combine the decisions of several models about one recording.
 
-    The decision about a sample is that of the model whose index is the unit of the sample.
+    A sample is decided by the model whose index is the unit of the sample.
 
     Args:
         decisions: of each model, about the same recording.

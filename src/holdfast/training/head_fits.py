@@ -25,10 +25,10 @@ MIN_SPEED_SAMPLES = 500
 SPEED_PENALTY = 10.0
 """Weight of the squared coefficients, beside the sum of squared errors over the samples."""
 STILL_WEIGHT = 0.3
-"""Weight of all samples that hold still, as a share of that of those that slide.
+"""Weight of all samples that hold still, as a share of the weight of all that slide.
 
-Without them the speed rises less with that of the marker on the real recordings, and a false alarm
-slides further."""
+Without them the speed follows the marker of the real recordings less, and a false alarm slides
+further."""
 MIN_CAUSE_SAMPLES = 50
 """A cause with fewer samples is left out."""
 CAUSE_PENALTY = 1e-3
@@ -164,9 +164,9 @@ def missing_heads(
     for finger, samples in causes.items():
         if model.finger(finger).head("cause") is None:
             counts = np.bincount(np.asarray(samples.values), minlength=len(CAUSES) + 1)[1:]
-            given = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
+            counted = [f"{n} of {cause}" for cause, n in zip(CAUSES, counts, strict=True) if n]
             yield (
-                f"{names[finger]}: unstable samples {', '.join(given)} given, at least "
+                f"{names[finger]}: unstable samples {', '.join(counted)} given, at least "
                 f"{MIN_CAUSE_SAMPLES} of each of two causes expected; the model names no cause "
                 "there"
             )

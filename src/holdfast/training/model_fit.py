@@ -61,7 +61,7 @@ class TrainingData:
 
     @property
     def thinned(self) -> dict[str, tuple[int, int]]:
-        """Number of used and of all labelled samples of each finger of which not all are used."""
+        """Number of used and of all labelled samples, by finger, where some are left out."""
         counts = {f: (len(pool.units), pool.n_usable) for f, pool in self.fingers.items()}
         return {finger: (used, n) for finger, (used, n) in counts.items() if used < n}
 

@@ -123,7 +123,7 @@ class Setting:
 
         Args:
             init: the model to adapt.
-            chosen: other fields; they replace those of the model.
+            chosen: other fields; they outrank the model's.
 
         Raises:
             ModelError: the fingers of the model have different features; or as the class.
@@ -161,7 +161,7 @@ class Setting:
 
     @property
     def slip_features(self) -> tuple[FeatureSpec, ...] | None:
-        """Features of the slip rule alone; None if it has those of stability.
+        """Features of the slip rule alone; None if it has the features of stability.
 
         Beside relative features, it has only relative ones of its own.
         """
@@ -174,7 +174,7 @@ class Setting:
 
     @property
     def used_tare(self) -> Tare:
-        """The tare that is given, else that of the features."""
+        """The tare that is given, else the tare that fits the features."""
         if self.tare is not None:
             return self.tare
         return Tare.parse("first" if self.relative else 0.5)
@@ -198,13 +198,13 @@ class Setting:
 
     @property
     def debounce(self) -> Debounce:
-        """Debouncing of the model; minimum duration and filter are those of the adapted model."""
-        known = Debounce() if self.init is None else self.init.debounce
-        return Debounce(known.min_duration, self.hysteresis, self.hold, known.switching)
+        """Debouncing of the model; minimum duration and filter come from the adapted model."""
+        adapted = Debounce() if self.init is None else self.init.debounce
+        return Debounce(adapted.min_duration, self.hysteresis, self.hold, adapted.switching)
 
     @property
     def rate(self) -> float | None:
-        """Rate for which the model's windows are meant [Hz]; None for that of the data."""
+        """Rate for which the model's windows are meant [Hz]; None for the rate of the data."""
         return None if self.init is None else self.init.rate
 
 

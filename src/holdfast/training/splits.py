@@ -69,7 +69,7 @@ class DataSplit:
         return np.full(n_samples, self.group_of[index])
 
     def recordings_without(self, left_out: Collection[int]) -> list[int]:
-        """Return the indices of the recordings of which not all samples are in held units."""
+        """Return the indices of the recordings that have samples outside the held units."""
         if self.split in ("time", "random"):
             return list(range(len(self.group_of)))
         return [index for index, unit in enumerate(self.group_of) if unit not in left_out]
@@ -132,17 +132,17 @@ def check_nothing_shared(
     Raises:
         TrainingError: two share a block.
     """
-    owners = np.repeat(np.arange(len(blocks)), [len(own) for own in blocks])
+    owners = np.repeat(np.arange(len(blocks)), [len(blocks_of_one) for blocks_of_one in blocks])
     digests = np.concatenate(blocks)
     order = np.argsort(digests, kind="stable")
     owners, digests = owners[order], digests[order]
     first, second = owners[:-1], owners[1:]
     shared = np.flatnonzero((digests[1:] == digests[:-1]) & (groups[first] != groups[second]))
     if len(shared):
-        one, other = names[first[shared[0]]], names[second[shared[0]]]
+        name, other = names[first[shared[0]]], names[second[shared[0]]]
         raise TrainingError(
-            f"recordings {one!r} and {other!r} share readings: one would be tested by a model that "
-            f"was trained on the other; remove one of them{hint}"
+            f"recordings {name!r} and {other!r} share readings: one would be tested by a model "
+            f"that was trained on the other; remove one of them{hint}"
         )
 
 

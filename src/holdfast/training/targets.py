@@ -106,75 +106,77 @@ class TargetInput(NamedTuple):
         return TargetSamples(features[rows], values[rows], self.units[rows], recordings, n_usable)
 
 
-def slip_target(given: TargetInput, features: Array) -> TargetSamples:
+def slip_target(target: TargetInput, features: Array) -> TargetSamples:
     """Return what slides, and some of what holds still.
 
     A model of one hand learns the first 0.1 s of slips, and to tell them from pushes. On real
     recordings that misled a model of any hand, so it learns all that slides and all that does not.
 
     Args:
-        given: the finger.
+        target: the finger.
         features: (n, n_features) of the head.
     """
-    truth, step = given.truth, given.step
+    truth, step = target.truth, target.step
     slides = truth.codes == SLIDING
-    if not given.is_any:
-        slides &= _in_spans([(s.onset, s.onset + EARLY_DURATION) for s in truth.slips], given.times)
+    if not target.is_any:
+        slides &= _in_spans(
+            [(s.onset, s.onset + EARLY_DURATION) for s in truth.slips], target.times
+        )
     is_still = truth.codes == STILL
     usable = finite_rows(features, slides | is_still)
-    quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if given.is_any else QUIET_STEP)]
+    quiet = usable[(is_still & truth.quiet)[usable]][:: step * (1 if target.is_any else QUIET_STEP)]
     disturbed = usable[(is_still & ~truth.quiet)[usable]][::step]
-    # What slides is not thinned: it is rare.
+    # Samples that slide are not thinned: they are rare.
     rows = np.sort(np.concatenate([usable[slides[usable]], quiet, disturbed]))
-    return given.samples(features, slides, rows, len(usable))
+    return target.samples(features, slides, rows, len(usable))
 
 
-def speed_target(given: TargetInput, features: Array) -> TargetSamples | None:
+def speed_target(target: TargetInput, features: Array) -> TargetSamples | None:
     """Return what slides, of slips over 1 mm, and some of what holds still, with its speed.
 
     Args:
-        given: the finger.
+        target: the finger.
         features: (n, n_features) of the head.
 
     Returns:
         The samples; None if the true speed is not known.
     """
-    recording, finger, truth = given.recording, given.finger, given.truth
+    recording, finger, truth = target.recording, target.finger, target.truth
     if recording.truth is None or not has_slip_truth(recording.truth, finger):
         return None
-    slides = in_long_slips(given.times, truth)
+    slides = in_long_slips(target.times, truth)
     used = slides.copy()
     used[np.flatnonzero(truth.codes == STILL)[::STILL_STEP]] = True
     rows = finite_rows(features, used)
-    speed = np.where(slides, true_speed(recording, finger, given.times), 0.0)
-    return given.samples(features, speed, rows, len(rows))
+    speed = np.where(slides, true_speed(recording, finger, target.times), 0.0)
+    return target.samples(features, speed, rows, len(rows))
 
 
-def cause_target(given: TargetInput, features: Array) -> TargetSamples | None:
+def cause_target(target: TargetInput, features: Array) -> TargetSamples | None:
     """Return the unstable samples whose cause is known, as codes.
 
-    Causes are those of the truth, where the recording has one, else those of the labels. What
+    Causes come from the truth, where the recording has one, else from the labels. What
     slides is left out: the head `slip` decides about it.
 
     Args:
-        given: the finger.
+        target: the finger.
         features: (n, n_features) of the head.
 
     Returns:
         The samples; None if there are none.
     """
-    recording, finger = given.recording, given.finger
+    recording, finger = target.recording, target.finger
     labels = labels_by_truth(recording, LabelRule(margin=0.0)).get(
         finger, recording.modules[finger].labels
     )
-    codes = np.zeros(len(given.times), dtype=np.int64)
+    codes = np.zeros(len(target.times), dtype=np.int64)
     for label in labels:
         if label.state is ContactState.UNSTABLE and label.cause not in (None, Cause.SLIP):
-            first, last = np.searchsorted(given.times, (label.start, label.end))
+            first, last = np.searchsorted(target.times, (label.start, label.end))
             codes[first:last] = CAUSES.index(ALIKE.get(label.cause, label.cause)) + 1
-    usable = finite_rows(features, (codes > 0) & (given.truth.codes != SLIDING))
-    rows = usable[:: given.step]
-    return given.samples(features, codes, rows, len(usable)) if len(rows) else None
+    usable = finite_rows(features, (codes > 0) & (target.truth.codes != SLIDING))
+    rows = usable[:: target.step]
+    return target.samples(features, codes, rows, len(usable)) if len(rows) else None
 
 
 TARGETS: dict[HeadName, Callable[[TargetInput, Array], TargetSamples | None]] = {

@@ -195,7 +195,7 @@ class CurvePoint(msgspec.Struct, frozen=True):
     def of_slips(cls, threshold: float, counts: SlipCounts) -> Self:
         """Return the point of the slips of fingers, missed without an alarm in 0.1 s."""
         slips = slip_metrics(counts)
-        missed = {t: None if found is None else 100 - found for t, found in slips.incipient.items()}
+        missed = {t: None if share is None else 100 - share for t, share in slips.incipient.items()}
         return cls(
             threshold, slips.false_alarms_per_minute["held"] or 0.0, missed, "0.1",
             slips.n, slips.held_minutes, (slips.raised_quiet or 0.0) <= MAX_RAISED_QUIET,
@@ -204,12 +204,12 @@ class CurvePoint(msgspec.Struct, frozen=True):
 
     @property
     def scores(self) -> SlipMetrics | dict[str, Any]:
-        """What a document has of the point."""
+        """The scores of the point, for JSON."""
         stable = {"threshold": self.threshold, "stable": self.stable, "events": self.events}
         return stable if self.slips is None else self.slips
 
     def cost(self, false_alarms: float) -> tuple[float, ...]:
-        """Return what the best point has least of.
+        """Return the cost of the point, in order of importance.
 
         Few enough false alarms come first, then few missed events (the sum over all times within
         which they are counted), then few false alarms.
@@ -384,7 +384,7 @@ class Tuned:
 
     @property
     def other_head(self) -> str:
-        """What becomes of the slip head that has no part in `changes`, in one line; else empty."""
+        """Line about the slip head whose threshold was not chosen; empty without such a head."""
         if self.chosen.slips is None or self.changes is not None:
             return ""
         if self.head == "slip_changes":
@@ -435,8 +435,8 @@ def tune(
             digests[recording.name] = recording.readings_digest
             sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
             for finger in sensors.items():
-                for one in model.finger(*finger).heads:
-                    highest[one.name] = max(highest.get(one.name, 0.0), one.threshold)
+                for rule in model.finger(*finger).heads:
+                    highest[rule.name] = max(highest.get(rule.name, 0.0), rule.threshold)
             yield recording
 
     curves: dict[HeadName, Curve] = (
@@ -505,14 +505,16 @@ def choose_slip_threshold(
     used = [(fingers, unit) for fingers, unit in zip(curves, groups, strict=True) if fingers]
     if not used:
         return SlipThreshold(None, None, "no decision about a slip out of fold")
-    known, units = [fingers for fingers, _ in used], [unit for _, unit in used]
-    pooled = SlipCounts.total([SlipCounts.total(fingers.values()) for fingers in known])
+    curves_by_finger, units = [fingers for fingers, _ in used], [unit for _, unit in used]
+    pooled = SlipCounts.total([SlipCounts.total(fingers.values()) for fingers in curves_by_finger])
     index = choose_threshold(pooled, SLIP_FALSE_ALARMS)
     if len(set(units)) > 1:
-        metrics = summarise_choice(known, SLIP_FALSE_ALARMS, groups=units, seed=seed)
+        metrics = summarise_choice(curves_by_finger, SLIP_FALSE_ALARMS, groups=units, seed=seed)
     else:
         shown = len(SLIP_THRESHOLDS) - 1 if index is None else index
-        metrics = slip_summary([{name: of[shown] for name, of in f.items()} for f in known])
+        metrics = slip_summary(
+            [{name: of[shown] for name, of in f.items()} for f in curves_by_finger]
+        )
     minutes = pooled.held_seconds / 60
     if (reason := too_short(minutes, SLIP_FALSE_ALARMS)) or index is None:
         return SlipThreshold(None, metrics, reason or (
@@ -729,9 +731,9 @@ class HandlingSlips(msgspec.Struct, frozen=True):
                 f"{self.head}: no threshold with few enough false alarms finds a tenth of the "
                 f"training's slips, so none is reported; look whether something slips at {times}"
             )
-        found = "" if self.found is None else f", finds {self.found:.0f} % of the training's slips"
+        share = "" if self.found is None else f", finds {self.found:.0f} % of the training's slips"
         return (
-            f"{self.head}: reported from {self.threshold:.3g} on{found}; {self.n} false alarms in "
+            f"{self.head}: reported from {self.threshold:.3g} on{share}; {self.n} false alarms in "
             f"{self.minutes:.1f} minutes of a finger: at most {self.at_most:.1f} a minute with "
             f"95 %, {self.more_minutes:g} minutes more bring it to {self.then_at_most:.1f}"
         )
@@ -765,8 +767,8 @@ def choose_handling_slips(
         curve = SlipCounts.total([slip_curve(slips) for _, slips in decided])
         index = choose_threshold(curve, shown * false_alarms)
         threshold = 1.0 if index is None else float(SLIP_THRESHOLDS[index])
-        found = head.share_found(threshold)
-        if found is not None and found < MIN_FOUND:
+        share = head.share_found(threshold)
+        if share is not None and share < MIN_FOUND:
             index = None
         n = int(curve.false_held[-1 if index is None else index])
         minutes = shown * curve.held_seconds / 60
@@ -780,7 +782,7 @@ def choose_handling_slips(
                 at_most=poisson_limit(n) / minutes,
                 more_minutes=MORE_MINUTES,
                 then_at_most=poisson_limit(round(n * then / minutes)) / then,
-                found=None if found is None else 100 * found,
+                found=None if share is None else 100 * share,
                 highest=tuple(_highest(decided)),
             )
         )
@@ -792,10 +794,10 @@ def _highest(decided: Sequence[tuple[GraspingFinger, SlipDecisions]]) -> Iterato
     probabilities = [np.where(f.grasped, slips.probability, -1.0) for f, slips in decided]
     for _ in range(N_HIGHEST):
         k = int(np.argmax([np.nanmax(p, initial=-1.0) for p in probabilities]))
-        (finger, slips), own = decided[k], probabilities[k]
-        best = int(np.nanargmax(own))
-        if own[best] < 0:
+        (finger, slips), probability = decided[k], probabilities[k]
+        best = int(np.nanargmax(probability))
+        if probability[best] < 0:
             return
         time = float(slips.times[best])
-        yield SlipAlarm(finger.replay.raw.name, finger.name, time, float(own[best]))
-        own[np.abs(slips.times - time) < APART] = -1.0
+        yield SlipAlarm(finger.replay.raw.name, finger.name, time, float(probability[best]))
+        probability[np.abs(slips.times - time) < APART] = -1.0

@@ -85,7 +85,7 @@ class Trained:
 
     @property
     def verdict(self) -> str | None:
-        """What the model is worth; None if some recordings are `known`."""
+        """The verdict on the model; None if some recordings are `known`."""
         return None if self.known else verdict(self.cross_validation, self.tares)
 
 
@@ -105,20 +105,19 @@ def train(
 
     Args:
         recordings: labelled; may be a lazy dataset.
-        setting: of the training; by default that of the paper's deployed model.
+        setting: of the training; by default the paper's deployed model has it.
         warn: is called with the text of every warning.
         progress: iterates over recordings, choices and fits.
         n_jobs: number of processes on this machine; -1 for one per processor.
         engine: that reads the recordings, chooses and fits, instead of `n_jobs` processes. The
-            result is the same. On a cluster, all machines need the recordings at the same
-            paths.
+            result is the same.
 
     Raises:
         TrainingError: there are no labels, only one class, or too few recordings or objects
             for the split.
         ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
-        EngineError: the engine cannot be used.
+        EngineError: a process died.
     """
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
     trainer = _Trainer.read(recordings, setting, warn, progress, engine)
@@ -158,9 +157,9 @@ def train(
     blocks = [recording.blocks for recording in trainer.data.scan.recordings]
     model = model.with_training(provenance, blocks)
     init = trainer.setting.init
-    known = () if init is None else tuple(known_recordings(init, trainer.data.scan))
+    names = () if init is None else tuple(known_recordings(init, trainer.data.scan))
     tares = LoadedTares(scored.n_loaded, len(recordings))
-    return Trained(model, metrics, trainer.setting.split, tares, known)
+    return Trained(model, metrics, trainer.setting.split, tares, names)
 
 
 class OutOfFold(NamedTuple):
@@ -216,8 +215,8 @@ class _Trainer:
             features = _that_fit(setting.features, scan.smallest, warn)
             setting = replace(setting, features=features)
         elif any(part.handling for part in init.fingers.values()):
-            # Its classifiers then have the own handling of these sensors inside their weights, so
-            # that they are adapted as they work.
+            # Adaptation starts from the calibrated classifier: the calibration becomes a part of
+            # its weights.
             setting = replace(setting, init=init.with_handling_of(scan.sensors))
         if setting.split == "recording" and init is not None and len(scan.recordings) == 1:
             # To adapt to a single grasp is allowed, though nothing else can be held out.
@@ -227,15 +226,15 @@ class _Trainer:
             )
             setting = replace(setting, split="time")
         data_split = split_data(scan.recordings, setting.split, setting.seed)
-        own = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
+        slips = setting.slip_features and _that_fit(setting.slip_features, scan.smallest, warn)
         plan = SamplesPlan(
-            scan, setting, data_split, own or setting.features,
+            scan, setting, data_split, slips or setting.features,
             only_stable=setting.init is not None,
         )  # fmt: skip
         samples = gather_samples(recordings, plan, engine, progress)
-        if own and not samples.of("slip"):
+        if slips and not samples.of("slip"):
             warn("no slips are known in the recordings: the model gets no slip rule")
-        data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(own))
+        data = TrainingData(scan, data_split, samples, plan.slip_features, slip_squares=bool(slips))
         return cls(recordings, setting, data, warn, progress, engine)
 
     def check(self) -> None:
@@ -277,16 +276,16 @@ class _Trainer:
         if setting.trials is not None:
             reference = {finger: setting.recipe_of(finger).reference for finger in fingers}
             return [reference for _ in left_out_units]
-        found: list[dict[str, Parameters]] = [{} for _ in left_out_units]
+        choices: list[dict[str, Parameters]] = [{} for _ in left_out_units]
         if init is not None:
-            for left_out, parameters_of in zip(left_out_units, found, strict=True):
+            for left_out, parameters_of in zip(left_out_units, choices, strict=True):
                 for finger, pool in fingers.items():
                     prior = init.finger(finger).stable.rule
                     adaptation = choose_adaptation(pool, prior, left_out)
                     parameters_of[finger] = adaptation.parameters
                     if not left_out:  # the final model: the one that the user gets
                         self.warn(adaptation.describe(init.name or "the model to adapt", finger))
-            return found
+            return choices
         tasks = (
             (thin(pool.without(left_out), SEARCH_SAMPLES), setting, finger)
             for left_out in left_out_units
@@ -304,8 +303,8 @@ class _Trainer:
         """Score predictions out of fold.
 
         Args:
-            chosen: parameters of every finger from each choice. Unit k uses those of choice k
-                modulo the number of choices.
+            chosen: parameters of every finger from each choice. Unit k uses the parameters of
+                choice k modulo the number of choices.
         """
         n_units = len(self.data.data_split.units)
         n_fits = min(n_units, MAX_FITS)

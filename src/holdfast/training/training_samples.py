@@ -33,7 +33,7 @@ from holdfast.training.targets import TARGETS, TargetInput, TargetSamples
 
 @dataclass(frozen=True)
 class SamplesPlan:
-    """What the training samples of any recording of a dataset depend on.
+    """Settings by which the training samples of a recording are gathered.
 
     Attributes:
         scan: of the dataset.
@@ -116,18 +116,18 @@ def gather_samples(
             parts[finger].append(samples)
             at_rest[finger][index] = samples.stable.at_rest[0]
     stable = {
-        finger: join_samples([part.stable for part in own], at_rest[finger])
-        for finger, own in parts.items()
-        if own
+        finger: join_samples([part.stable for part in of_finger], at_rest[finger])
+        for finger, of_finger in parts.items()
+        if of_finger
     }
     if plan.setting.is_shared:
         stable = {ANY_FINGER: pool_fingers(stable)}
-        parts = {ANY_FINGER: [part for own in parts.values() for part in own]}
+        parts = {ANY_FINGER: [part for of_finger in parts.values() for part in of_finger]}
     others: dict[HeadName, dict[str, TargetSamples]] = {}
-    for finger, own in parts.items():
+    for finger, of_finger in parts.items():
         for head in TARGETS:
-            known = [part.others[head] for part in own if head in part.others]
-            if known and (joined := TargetSamples.joined(known)).n_positive:
+            of_head = [part.others[head] for part in of_finger if head in part.others]
+            if of_head and (joined := TargetSamples.joined(of_head)).n_positive:
                 others.setdefault(head, {})[finger] = joined
     return HeadSamples(stable, others)
 
@@ -221,12 +221,12 @@ def _samples_of_part(
         truth = slip_truth(recording, finger, module.times) if with_others else None
         if truth is not None:
             step_of_rows = recording_step * step
-            given = TargetInput(
+            source = TargetInput(
                 recording, finger, truth, units, index, step_of_rows, is_any=scan.relative
             )
             for head, target in TARGETS.items():
                 columns = rows if head == "cause" else slip_rows[finger]
-                if (made := target(given, columns)) is not None:
+                if (made := target(source, columns)) is not None:
                     others[head] = made
         fingers[finger] = PartSamples(stable, others)
     return fingers

@@ -1,6 +1,6 @@
 """Model of a fingertip whose taxels send forces in steps, such as ORCA Touch.
 
-Shape of the fingertip, skin and grasp stay those of the twin; the taxels are mounted on its pad.
+Shape of the fingertip, skin and grasp are the twin's; the taxels are mounted on its pad.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ class ForceReadout:
         self._step, self._range = sensor.step or 1.0, sensor.range or (-np.inf, np.inf)
 
     def read(self, taxel_forces: npt.ArrayLike, times: npt.ArrayLike) -> Array:
-        """Compute the next readings (n, n_taxels, 3) [N]; arguments are those of `Uskin.counts`."""
+        """Compute the next readings (n, n_taxels, 3) [N]; for the arguments see `Uskin.counts`."""
         steps = np.asarray(taxel_forces, dtype=np.float64) / self._step
         noise = STEP_NOISE * self._generator.standard_normal(steps.shape)
         readings: Array = np.clip(np.rint(steps + noise) * self._step, *self._range)
@@ -68,8 +68,8 @@ def mounted(tip: Sensor) -> Array:
         True
     """
     pad = sensor("uskin-curved").positions
-    own = tip.positions @ MODULE_TO_FINGERTIP.T
-    result: Array = pad.min(axis=0) + (own - own.min(axis=0)) * (
-        np.ptp(pad, axis=0) / np.ptp(own, axis=0)
+    positions = tip.positions @ MODULE_TO_FINGERTIP.T
+    result: Array = pad.min(axis=0) + (positions - positions.min(axis=0)) * (
+        np.ptp(pad, axis=0) / np.ptp(positions, axis=0)
     )
     return result

@@ -124,7 +124,7 @@ def aims_of(item: GraspObject, finger: str) -> tuple[Array, Array]:
 def object_pose(item: GraspObject) -> tuple[Array, float]:
     """Return position in the world [m] and turn about z [rad] of the object before the grasp.
 
-    The position is that of its centre of mass; its middle is at `MIDDLE_PLACE`.
+    The position is the place of its centre of mass; its middle is at `MIDDLE_PLACE`.
     """
     x, y, z = MIDDLE_PLACE
     return np.array([x, -z, y - item.middle]), item.yaw
@@ -160,7 +160,7 @@ def _pad(hand: HandModel, index: int, joints: Array) -> tuple[Array, Array]:
 
 
 SERIES_GAIN = 1.8
-"""Displacement of the set-point for a given rise of torque, over that of a rigid finger and object.
+"""Displacement of the set-point for a rise of torque, over that of rigid fingers and objects.
 The pad yields, so the joints follow their set-points in part. Measured on the twin: with it, a
 scale of 2 doubles the force within 10 %."""
 PATH_STEP = 1e-3

@@ -39,16 +39,12 @@ ARMATURE, DAMPING, FRICTION = 6e-4, 0.012, 0.012
 choices: small gear motors that can be turned back by hand."""
 PALM_MASS, PALM_SIDES, PALM_MIDDLE = 0.4154, (0.0408, 0.113, 0.095), (-0.0093, 0.0, -0.0475)
 """Mass [kg], sides and middle [m] of the palm. The vendor's table has the centre of mass outside
-the box of the palm; here it is in its middle. All inertias are those of the boxes, because the
+the box of the palm; here it is in its middle. All inertias are computed from the boxes, because the
 vendor's are not physical."""
 TIP_MASS = 0.0266
 """Mass of the skin [kg], from XELA; it replaces a rubber tip of 16.8 g."""
 TIP_RADIUS, TIP_BEGIN, TIP_END = 0.0136, 0.006, 0.022
-"""Radius and ends, in the fingertip frame, of the capsule that is drawn for the skin [m]."""
-MOTOR_SIZE = (0.0106, 0.0142)
-"""Radius and half length of the drawn motors [m]."""
-SHELL_COLOUR, FRAME_COLOUR = ".74 .75 .78 1", ".25 .27 .31 1"
-SKIN_COLOUR, OBJECT_COLOUR = ".95 .55 .18 1", ".36 .62 .80 1"
+"""Radius and ends, in the fingertip frame, of the capsule that has the mass of the skin [m]."""
 
 Rows = list[dict[str, str]]
 
@@ -101,22 +97,12 @@ def hand_xml(item: GraspObject | None = None) -> str:
   <option timestep="{TIMESTEP!r}" integrator="implicitfast" gravity="0 0 {-GRAVITY}">
     <flag contact="disable"/>
   </option>
-  <visual>
-    <global offwidth="1280" offheight="960"/><quality shadowsize="2048"/>
-    <headlight ambient=".42 .42 .42" diffuse=".35 .35 .35" specular=".1 .1 .1"/>
-  </visual>
   <default>
-    <geom contype="0" conaffinity="0" rgba="{SHELL_COLOUR}"/>
+    <geom contype="0" conaffinity="0"/>
     <joint armature="{ARMATURE}" damping="{DAMPING}" frictionloss="{FRICTION}"
       limited="true"/>
   </default>
-  <asset>
-    <texture type="skybox" builtin="gradient" rgb1=".93 .95 .97" rgb2=".99 .99 .99" width="256"
-      height="256"/>
-  </asset>
   <worldbody>
-    <light pos=".5 -0.4 .9" dir="-.4 0.35 -.9"
-      diffuse=".55 .55 .55"/>
     <body name="palm" euler="{np.pi / 2!r} 0 0">
       {_box_xml(PALM_SIDES, PALM_MIDDLE, PALM_MASS)}
       {"".join(_link_xml(row, rows) for row in rows if row["parent"] == "palm_link")}
@@ -172,25 +158,19 @@ def _link_xml(row: dict[str, str], rows: Rows) -> str:
     number = int(row["joint"].removeprefix("joint_").removesuffix(".0"))
     sides = tuple(float(row[f"side_{a}"]) for a in "xyz")
     middle = tuple(float(row[f"middle_{a}"]) for a in "xyz")
-    # Of the motor, which is only drawn, the ends on the axis of its joint.
-    x, y, z = (MOTOR_SIZE[1] * float(row[f"axis_{a}"]) for a in "xyz")
-    motor = (
-        f'<geom type="cylinder" fromto="{-x:.6g} {-y:.6g} {-z:.6g} {x:.6g} {y:.6g} {z:.6g}" '
-        f'size="{MOTOR_SIZE[0]}" mass="0" rgba="{FRAME_COLOUR}"/>'
-    )
     tip = ""
     if not children:  # the skin: its mass, and a capsule of about its shape
         x, _, z = MOUNTS[0 if number >= JOINTS["thumb"] else 1]
         x += AXIS
         tip = (
             f'<geom type="capsule" fromto="{x:.6g} 0 {z + TIP_BEGIN:.6g} {x:.6g} 0 '
-            f'{z + TIP_END:.6g}" size="{TIP_RADIUS}" mass="{TIP_MASS}" rgba="{SKIN_COLOUR}"/>'
+            f'{z + TIP_END:.6g}" size="{TIP_RADIUS}" mass="{TIP_MASS}"/>'
         )
     return f"""<body name="{row["link"]}" pos="{row["x"]} {row["y"]} {row["z"]}"
       euler="{row["roll"]} {row["pitch"]} {row["yaw"]}">
       <joint name="joint_{number}" axis="{row["axis_x"]} {row["axis_y"]} {row["axis_z"]}"
         range="{row["lower"]} {row["upper"]}"/>
-      {_box_xml(sides, middle, float(row["mass"]))}{motor}{tip}{children}</body>"""
+      {_box_xml(sides, middle, float(row["mass"]))}{tip}{children}</body>"""
 
 
 def _box_xml(sides: tuple[float, ...], middle: tuple[float, ...], mass: float) -> str:
@@ -203,32 +183,4 @@ def object_xml(item: GraspObject) -> str:
     """Return the MJCF of a free object."""
     inertia = " ".join(f"{value:.9g}" for value in item.inertia)
     return f"""<body name="object"><freejoint/>
-      <inertial pos="0 0 0" mass="{item.mass}" diaginertia="{inertia}"/>
-      {_drawn_object_xml(item)}</body>"""
-
-
-def _drawn_object_xml(item: GraspObject) -> str:
-    colour = f'rgba="{OBJECT_COLOUR}"'
-    half, size, middle = item.half_height, item.size, item.middle
-    if item.shape == "sphere":
-        return f'<geom type="sphere" size="{size[0]}" {colour} mass="0"/>'
-    if item.shape == "box":
-        return f'<geom type="box" size="{size[0]} {size[1]} {size[2]}" {colour} mass="0"/>'
-    if item.shape == "capsule":
-        return f'<geom type="capsule" size="{size[0]} {half - size[0]}" {colour} mass="0"/>'
-    if item.shape == "hexagon":
-        width = size[0] / np.sqrt(3)
-        return "".join(  # faces of equal height would flicker through one another
-            f'<geom type="box" size="{size[0]} {width} {half - 1e-4 * k}" '
-            f'euler="0 0 {k * np.pi / 3!r}" {colour} mass="0"/>'
-            for k in range(3)
-        )
-    # MuJoCo has no frustum: it is drawn as slices.
-    n_slices = 24 if item.shape == "frustum" else 1
-    foot, top = (size[0], size[1]) if item.shape == "frustum" else (size[0], size[0])
-    thick = half / n_slices
-    return "".join(
-        f'<geom type="cylinder" size="{foot + (top - foot) * (k + 0.5) / n_slices} {thick}" '
-        f'pos="0 0 {middle - half + (2 * k + 1) * thick}" {colour} mass="0"/>'
-        for k in range(n_slices)
-    )
+      <inertial pos="0 0 0" mass="{item.mass}" diaginertia="{inertia}"/></body>"""

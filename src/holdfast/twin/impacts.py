@@ -72,7 +72,7 @@ class Impact(NamedTuple):
 
 
 class ImpactState(NamedTuple):
-    """What acts until the next sample.
+    """Force, torque and acceleration until the next sample.
 
     Attributes:
         force: (3,) on the object in the world [N].

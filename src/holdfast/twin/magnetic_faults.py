@@ -31,11 +31,10 @@ class MagneticFaults:
             times as long.
         zero_share: share of samples in which one taxel, another each time, reads zero.
         drift: standard deviation over taxels and axes of a steady drift [count/h].
-        cross_talk: share of the load of a finger that the next finger reads.
         invented_months: age of the skin: gains fall, and noise rises, by invented numbers.
 
     Raises:
-        ValueError: a number is negative or not finite, the turn time is 0, or a share is over 1.
+        ValueError: a number is negative or not finite, the turn time is 0, or the share is over 1.
 
     Example:
         >>> MagneticFaults(field=-1)
@@ -47,7 +46,6 @@ class MagneticFaults:
     turn_time: float = 8.0
     zero_share: float = 0.0
     drift: float = 0.0
-    cross_talk: float = 0.0
     invented_months: float = 0.0
 
     def __post_init__(self) -> None:
@@ -55,8 +53,8 @@ class MagneticFaults:
             value = getattr(self, part.name)
             if not (np.isfinite(value) and value >= 0):
                 raise ValueError(f"{part.name}: at least 0 expected, {value} given")
-        if self.turn_time == 0 or max(self.zero_share, self.cross_talk) > 1:
-            raise ValueError("a turn time above 0, and shares of at most 1 expected")
+        if self.turn_time == 0 or self.zero_share > 1:
+            raise ValueError("a turn time above 0, and a share of at most 1 expected")
 
     @classmethod
     def parse(cls, text: str) -> "MagneticFaults":
@@ -69,13 +67,13 @@ class MagneticFaults:
             >>> MagneticFaults.parse("field=300,turn-time=3").turn_time
             3.0
         """
-        known = [part.name.replace("_", "-") for part in fields(cls)]
+        names = [part.name.replace("_", "-") for part in fields(cls)]
         values: dict[str, float] = {}
-        for pair in filter(None, (each.strip() for each in text.split(","))):
+        for pair in filter(None, (text_part.strip() for text_part in text.split(","))):
             name, _, value = pair.partition("=")
-            if name not in known or name.replace("-", "_") in values:
+            if name not in names or name.replace("-", "_") in values:
                 raise ValueError(
-                    f"--faults with each of {', '.join(known)} at most once expected, "
+                    f"--faults with each of {', '.join(names)} at most once expected, "
                     f"{pair!r} given"
                 )
             try:
@@ -117,27 +115,24 @@ class MagneticFaults:
             rest: (n_taxels, 3) readings of each finger without load [count].
             seed: of the units; another one is another hand.
         """
-        field, found, load = self.field_at(times), {}, None
+        field, counts_by_finger = self.field_at(times), {}
         numbers = np.rint(np.asarray(times) * 1e6).astype(np.int64)
         for index, (name, sensor) in enumerate(sensors.items()):
             unit = np.random.default_rng([seed, index])
             zero, shape = np.asarray(rest[name], dtype=np.float64), (sensor.n_taxels, 3)
             age = self.invented_months * np.exp(UNIT_SPREAD * unit.standard_normal(shape))
             drift = self.drift * unit.standard_normal(shape)
-            own = (counts[name] - zero) * np.exp(-AGEING_OF_GAIN * age)
-            values = zero + own + drift * times[:, None, None] / 3600
+            load = (counts[name] - zero) * np.exp(-AGEING_OF_GAIN * age)
+            values = zero + load + drift * times[:, None, None] / 3600
             values += np.einsum("ikj,nk->nij", sensor.rotations, field)
-            if load is not None and load.shape == own.shape:
-                values += self.cross_talk * load
-            load = own
             for k, number in enumerate(numbers.tolist()):
                 if self.zero_share or self.invented_months:
                     drawn = np.random.default_rng([seed, index, number + (1 << 40)])
                     values[k] += AGEING_OF_NOISE * age * drawn.standard_normal(shape)
                     if drawn.random() < self.zero_share:
                         values[k, drawn.integers(sensor.n_taxels)] = 0
-            found[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
-        return found
+            counts_by_finger[name] = np.clip(np.rint(values), 0, COUNTS_END).astype(np.uint16)
+        return counts_by_finger
 
 
 WITHOUT_FAULTS = MagneticFaults()

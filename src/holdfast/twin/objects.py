@@ -258,7 +258,7 @@ def _height(shape: str) -> int:
 def _core(shape: str, size: tuple[float, ...]) -> Array:
     """Pack the smooth shape, (N_OBJECT_NUMBERS,), with its centre of mass at the middle."""
     core = np.zeros(N_OBJECT_NUMBERS)
-    # What is neither box nor hexagon is turned about its axis: a side, or a capsule's core.
+    # A shape that is neither box nor hexagon is turned about its axis: a side, or a capsule's core.
     codes = {"box": BOX, "hexagon": HEXAGON, "sphere": CAPSULE, "capsule": CAPSULE}
     core[CODE] = codes.get(shape, REVOLVED)
     if shape in ("sphere", "capsule"):
@@ -268,7 +268,7 @@ def _core(shape: str, size: tuple[float, ...]) -> Array:
     if shape not in ("cylinder", "frustum"):
         core[1 : len(size)] = [value - size[-1] for value in size[:-1]]
         return core
-    # A side that is parallel to that of the shape, one rounding inside. A cylinder is a frustum
+    # A side parallel to the side of the shape, one rounding inside. A cylinder is a frustum
     # with one radius.
     foot, top, half_height, rounding = size if shape == "frustum" else (size[0], *size)
     slope = (top - foot) / (2 * half_height)

@@ -3,7 +3,7 @@
 There are two kinds of disturbances. A hand grips the object and moves it to and fro without losing
 contact, as in the paper. Or a finger approaches from outside, pushes and leaves. Hand and finger
 have finite stiffness and tremor, because a pure force would make every object fall at once.
-operator.c computes their forces; here is drawn what they do.
+operator.c computes the forces; this module draws the disturbances at random.
 """
 
 from typing import NamedTuple

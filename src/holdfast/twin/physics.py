@@ -9,7 +9,7 @@ from holdfast.twin.hand import HandArrays
 
 
 class Action(NamedTuple):
-    """What the operator does during a sample, and the loads on the object.
+    """Action of the operator during a sample, and the loads on the object.
 
     Attributes:
         anchor: (12,) position and rotation at which the operator holds the object.

@@ -49,8 +49,8 @@ class Plant(msgspec.Struct, frozen=True, kw_only=True):
 
 MILD = "mild"
 PLANTS = {
-    one.name: one
-    for one in (
+    plant.name: plant
+    for plant in (
         Plant(name=MILD),
         Plant(
             name="hard",

@@ -17,7 +17,7 @@ from holdfast.twin.slip_events import SlipEvent, SlipKind, draw_slip_event
 from holdfast.twin.steps import PUSH
 
 SCRIPT_PROFILE = "slips"
-"""Profile of fingers and slip events of these grasps: its fingers are those of `reference`."""
+"""Profile of fingers and slip events of these grasps, with the fingers of `reference`."""
 FIRST_MOVE, FIRST_ACTION = 0.8, 3.0
 """Times from the lock to the move to and fro before pulls, and to the first action [s]."""
 AFTER_RELEASE = 6.0
@@ -33,7 +33,7 @@ LAST_ACTION = 1.0
 
 
 class Script(NamedTuple):
-    """What happens while the object is held; with no field set, nothing.
+    """Events while the object is held; without any field set, there are none.
 
     Attributes:
         kinds: slip events, in turn.

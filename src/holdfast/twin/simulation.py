@@ -2,7 +2,7 @@
 
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -145,9 +145,6 @@ class Grasp:
         return generator_of(self.seed, key)
 
 
-SampleCallback = Callable[[World, Command], None]
-
-
 class Simulation:
     """Simulation of one grasp, sample by sample. It takes grip forces while it runs.
 
@@ -197,7 +194,7 @@ class Simulation:
         lag = plant.motor_time * RATE
         # Share of the way to a command that a force goes in a sample: 1 without a lag.
         self._motor_part = -math.expm1(-1.0 / lag) if lag > 0 else 1.0
-        self._forces = np.ones(len(FINGERS))  # scales that act, behind those of the commands
+        self._forces = np.ones(len(FINGERS))  # scales that act, behind the scales of the commands
         self._slip_events = SlipEvents(self.plan.slip_events, grasp.item, 1 / RATE)
         self._arm_tremor = draw_tremor(grasp.generator("arm"))
         self._truth_log = TruthLog(FINGERS)
@@ -288,7 +285,7 @@ class Simulation:
         )
 
     def followed(self, scales: Array) -> Array:
-        """Return the scales that act, which follow those of the commands as the motors do."""
+        """Return the scales that act; they follow the scales of the commands as the motors do."""
         if self._motor_part < 1.0:
             self._forces = self._forces + self._motor_part * (scales - self._forces)
             return self._forces
@@ -306,7 +303,7 @@ class Simulation:
             if finger not in self._readouts:
                 self._readouts[finger] = skin.readout(self.grasp.generator(f"skin {finger}"))
             readings[finger] = self._readouts[finger].read(forces[None], time)
-        return {finger: own[0] for finger, own in self._with_faults(readings, time).items()}
+        return {finger: x[0] for finger, x in self._with_faults(readings, time).items()}
 
     def _with_faults(self, readings: dict[str, Readings], times: Array) -> Mapping[str, Readings]:
         """Return the readings (n, n_taxels, 3) of each finger with the troubles of the skins."""
@@ -374,14 +371,12 @@ class Simulation:
 def simulate(
     grasp: Grasp,
     parameters: UskinParameters | None = None,
-    on_sample: SampleCallback | None = None,
 ) -> Recording:
     """Simulate one grasp and return its recording with truth and labels.
 
     Args:
         grasp: the grasp.
         parameters: parameters of a uSkin; by default `UskinParameters()`.
-        on_sample: function that is called after each sample, for instance to draw a picture.
 
     Returns:
         Recording of four fingertips at 150 Hz. The metadata of a grasp that was never
@@ -396,8 +391,6 @@ def simulate(
     simulation = Simulation(grasp, parameters, plan=plan)
     while not simulation.is_over:
         simulation.step()
-        if on_sample is not None and simulation.command is not None:
-            on_sample(simulation.world, simulation.command)
     return simulation.recording()
 
 

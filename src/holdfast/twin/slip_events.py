@@ -124,7 +124,7 @@ class SlipEvent(NamedTuple):
 
 
 class SlipState(NamedTuple):
-    """What acts on the object until the next sample.
+    """Loads on the object until the next sample.
 
     Attributes:
         load: added mass, torque, friction and guiding hand.

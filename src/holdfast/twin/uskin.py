@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from holdfast.sensors import Sensor
-from holdfast.sensors.types import Array, Flags, Integers
+from holdfast.sensors.types import Array
 from holdfast.twin.uskin_readout import Counts, Readout, Taxels, UskinParameters
 
 MAX_STAMP_SHIFT = 0.45
@@ -129,7 +129,7 @@ class Uskin(FingertipSkin):
         """Start a run of the sensor from rest, which takes samples in chunks of any size.
 
         Args:
-            generator: generator of noise and warming; by default that of the sensor.
+            generator: generator of noise and warming; by default the sensor's.
         """
         return Readout(self.parameters, self.taxels, generator or self._generator)
 
@@ -156,49 +156,6 @@ class Uskin(FingertipSkin):
                 not increase.
         """
         return self.readout(generator).read(taxel_forces, times)
-
-
-def last_updates(times: npt.ArrayLike, rate: float, phase: float) -> Integers:
-    """Return (n,) the sample that each row of a stream shows, if the sensor updates slowly.
-
-    The sensor updates at a rate of its own; a row shows the first sample since the last update.
-
-    Args:
-        times: (n,) increasing times of the rows [s].
-        rate: of updates [Hz].
-        phase: of the updates, from 0 to 1.
-
-    Example:
-        >>> last_updates([0.0, 0.025, 0.05, 0.075, 0.1, 0.125], 10.0, 0.0).tolist()
-        [0, 0, 0, 0, 4, 4]
-    """
-    number = np.floor(np.asarray(times, dtype=np.float64) * rate + phase + 1e-9)
-    first = np.diff(number, prepend=-np.inf) > 0
-    result: Integers = np.maximum.accumulate(np.where(first, np.arange(len(number)), 0))
-    return result
-
-
-def kept_in_gaps(
-    times: npt.ArrayLike, rate: float, length: tuple[float, float], generator: np.random.Generator
-) -> Flags:
-    """Return (n,) which samples of a stream remain where packets are lost in gaps.
-
-    Args:
-        times: (n,) increasing times [s].
-        rate: of gaps [1/s].
-        length: range of the time in which all packets are lost [s].
-        generator: random number generator.
-    """
-    clock = np.asarray(times, dtype=np.float64)
-    kept = np.ones(len(clock), dtype=bool)
-    if len(clock) < 2:
-        return kept
-    n_gaps = int(generator.poisson(rate * (clock[-1] - clock[0])))
-    starts = generator.uniform(clock[0], clock[-1], n_gaps)
-    for start, stop in zip(starts, starts + generator.uniform(*length, n_gaps), strict=True):
-        kept[slice(*np.searchsorted(clock, (start, stop)))] = False
-    kept[[0, -1]] = True
-    return kept
 
 
 def with_server_effects(

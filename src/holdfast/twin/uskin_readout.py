@@ -19,7 +19,7 @@ from holdfast.twin.steps import read_out
 class UskinParameters:
     """Parameters of the model of a uSkin fingertip.
 
-    Nothing is published on the curved fingertip. "Data sheet" is that of the flat uSPa46 (July
+    Nothing is published on the curved fingertip. "Data sheet" means that of the flat uSPa46 (July
     2025, high sensitivity). "Packets" are two packets of whole Allegro hands, 368 taxels each.
 
     Attributes:
@@ -163,7 +163,7 @@ class Taxels(NamedTuple):
 
 
 class _Constants(NamedTuple):
-    """What a fingertip does not change, for c/uskin_readout.c.
+    """Constants of a fingertip for c/uskin_readout.c.
 
     Attributes:
         taxels: properties of the taxels.
@@ -251,7 +251,7 @@ class Readout:
             parameters.thermal_time,
         )
         self._generator = generator
-        # Its own, so that a slow part of the noise leaves all other draws as they are.
+        # A separate generator, so that slow noise does not change the other draws.
         self._colour_generator = generator.spawn(1)[0]
         shape = taxels.baseline.shape
         self._state = _State(

@@ -80,8 +80,8 @@ class Guard:
             return True
         bearer = request.headers.get("Authorization", "").removeprefix("Bearer ")
         # A browser sends no header of ours with a video or a WebSocket: they have it in the query.
-        given = bearer or request.query.get("token", "")
-        return hmac.compare_digest(_bytes(given), _bytes(self._token))
+        token = bearer or request.query.get("token", "")
+        return hmac.compare_digest(_bytes(token), _bytes(self._token))
 
 
 def _bytes(token: str) -> bytes:

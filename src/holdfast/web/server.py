@@ -7,7 +7,6 @@ import sys
 import webbrowser
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import Any
 from urllib.parse import quote
 
 from aiohttp import web
@@ -17,10 +16,8 @@ from holdfast.web.connections import (
     BACKLOG,
     HEADER_TIMEOUT,
     LOGGER,
-    ConnectionLimit,
     log_exceptions_briefly,
 )
-from holdfast.web.guard import SECURITY_HEADERS, Handler
 
 STOP_POLL_INTERVAL = 0.2
 """Time between two calls of `is_over` [s]."""
@@ -77,7 +74,9 @@ async def _serve(
 
 @asynccontextmanager
 async def listening(app: web.Application, host: str, port: int) -> AsyncIterator[str]:
-    """Serve a web application in the running event loop, with limited connections.
+    """Serve a web application in the running event loop.
+
+    aiohttp closes a connection whose header does not arrive within the keep-alive timeout.
 
     Yields:
         The address of the page.
@@ -85,82 +84,26 @@ async def listening(app: web.Application, host: str, port: int) -> AsyncIterator
     Raises:
         OutputError: the address is in use or cannot be bound.
     """
-    limit = ConnectionLimit.of_process()
-
-    @web.middleware
-    async def mark(request: web.Request, handler: Handler) -> web.StreamResponse:
-        with limit.request(request.transport):
-            return await handler(request)
-
-    app.middlewares.insert(0, mark)  # the first: a request that is refused is one too
-    runner = web.AppRunner(app, shutdown_timeout=SHUTDOWN_TIMEOUT)
+    runner = web.AppRunner(
+        app,
+        shutdown_timeout=SHUTDOWN_TIMEOUT,
+        keepalive_timeout=HEADER_TIMEOUT,
+        lingering_time=LINGERING_TIME,
+        auto_decompress=False,
+        logger=LOGGER,
+        access_log=None,
+    )
     await runner.setup()
     try:
-        server = await _listen(runner, limit, host, port)
         try:
-            shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
-            shown = f"[{shown}]" if ":" in shown else shown
-            yield f"http://{shown}:{server.sockets[0].getsockname()[1]}/"
-        finally:
-            server.close()
+            await web.TCPSite(runner, host, port, backlog=BACKLOG).start()
+        except (OSError, OverflowError) as cause:
+            raise listen_error(host, port, cause) from cause
+        shown = "127.0.0.1" if host in ("0.0.0.0", "::") else host
+        shown = f"[{shown}]" if ":" in shown else shown
+        yield f"http://{shown}:{runner.addresses[0][1]}/"
     finally:
         await runner.cleanup()
-
-
-class _LimitedConnection(web.RequestHandler):
-    """Connection of a client, which counts for a limit.
-
-    aiohttp closes a connection whose header does not arrive within the keep-alive timeout.
-    """
-
-    __slots__ = ("_limit", "_own_transport")
-
-    def __init__(self, server: web.Server, limit: ConnectionLimit) -> None:
-        super().__init__(
-            server,
-            loop=asyncio.get_running_loop(),
-            keepalive_timeout=HEADER_TIMEOUT,
-            lingering_time=LINGERING_TIME,
-            auto_decompress=False,
-            logger=LOGGER,
-            access_log=None,  # type: ignore[arg-type]  # aiohttp accepts it
-        )
-        self._limit = limit
-        self._own_transport: asyncio.BaseTransport | None = None
-
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        super().connection_made(transport)
-        self._own_transport = transport
-        self._limit.add(transport)
-
-    def connection_lost(self, error: BaseException | None) -> None:
-        self._limit.remove(self._own_transport)
-        super().connection_lost(error)
-
-    def set_parser(self, *parts: Any, **named: Any) -> None:  # noqa: ANN401 (of aiohttp)
-        """Keep the connection: it is a WebSocket from here on."""
-        super().set_parser(*parts, **named)
-        self._limit.mark_stream(self._own_transport)
-
-    def handle_error(self, *parts: Any, **named: Any) -> web.StreamResponse:  # noqa: ANN401
-        """Return the response to a request that is not valid, or that failed."""
-        response = super().handle_error(*parts, **named)
-        response.headers.update(SECURITY_HEADERS)
-        return response
-
-
-async def _listen(
-    runner: web.AppRunner, limit: ConnectionLimit, host: str, port: int
-) -> asyncio.Server:
-    application = runner.server
-    if application is None:
-        raise RuntimeError("the application is not set up")
-    try:
-        return await asyncio.get_running_loop().create_server(
-            lambda: _LimitedConnection(application, limit), host, port, backlog=BACKLOG
-        )
-    except (OSError, OverflowError) as cause:
-        raise listen_error(host, port, cause) from cause
 
 
 def page_url(url: str, token: str | None) -> str:

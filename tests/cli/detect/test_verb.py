@@ -156,7 +156,6 @@ class TestSummary:
             (): held.debounce,
             ("--debounce", 0): Debounce(0.0, 0.2, 0.4),
             ("--hysteresis", 0.1): Debounce(0.3, 0.1, 0.4),
-            ("--raw",): Debounce(),
         }.items():
             chosen = msgspec.structs.replace(held, debounce=debounce)
             unstable = np.mean(detect(chosen, recording).fingers["thumb"].state == UNSTABLE)

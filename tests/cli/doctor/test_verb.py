@@ -4,7 +4,6 @@ import sys
 from importlib import metadata
 
 import numpy as np
-import pytest
 
 from holdfast import save_recording
 from holdfast.cli import main
@@ -13,12 +12,6 @@ from holdfast.devices.uri import source_states
 from holdfast.errors import DISTRIBUTION, EXTRA_PURPOSES, install_command
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import Sensor, sensor
-
-
-@pytest.fixture(autouse=True)
-def no_children(monkeypatch):
-    """Start no Python for each plug-in: `tests/test_plugins.py` has what the children answer."""
-    monkeypatch.setattr("holdfast.children.answer_of_child", lambda *words: "")
 
 
 def report(capsys):
@@ -92,8 +85,8 @@ def test_missing_extras_are_reported(monkeypatch):
 
 
 def test_the_modules_of_a_source(capsys, tmp_path):
-    history, plot = tmp_path / "history.json", tmp_path / "x.svg"
-    call = ["doctor", saved(tmp_path, sensor("uskin-4x4")), "--history", str(history)]
+    plot = tmp_path / "x.svg"
+    call = ["doctor", saved(tmp_path, sensor("uskin-4x4"))]
     assert main([*call, "--plot", str(plot)]) == 0
     out, err = capsys.readouterr()
     assert "\nindex " in out
@@ -101,14 +94,12 @@ def test_the_modules_of_a_source(capsys, tmp_path):
     assert main([*call, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert (list(found["modules"]), found["findings"]) == (["index"], [])
-    assert found["last"] == found["date"] and found["history"] == str(history)
 
 
 def test_a_module_of_one_taxel_is_said(capsys, tmp_path):
     flat = sensor("anyskin")
     one = Sensor("one", flat.positions[:1], flat.rotations[:1], flat.normal, 100.0, magnetic=True)
-    history = str(tmp_path / "history.json")
-    assert main(["doctor", saved(tmp_path, one), "--history", history]) == 0
+    assert main(["doctor", saved(tmp_path, one)]) == 0
     assert "index has one taxel" in capsys.readouterr().out.splitlines()[-1]
 
 

@@ -1,5 +1,3 @@
-import shutil
-
 import pytest
 
 from command_line import Verb
@@ -20,7 +18,7 @@ def test_the_sizes_of_a_model_are_printed(capsys, tmp_path):
     assert (code, err) == (0, "")
     lines = out.splitlines()
     assert lines[0].endswith("model.h: the detector of finger1, finger2")
-    assert [line.split()[0] for line in lines[1:]] == ["state", "constants", "code"]
+    assert [line.split()[0] for line in lines[1:]] == ["state", "constants"]
 
 
 def test_json_has_the_sizes(capsys, grasp, tmp_path):
@@ -28,7 +26,6 @@ def test_json_has_the_sizes(capsys, grasp, tmp_path):
     document = VERB.document(capsys, *words)
     assert document["fingers"] == ["thumb", "index"]
     assert document["state_size"] > 10_000 and "track.time" in document["double_fields"]
-    assert (document["code_size"] is None) == (shutil.which("cc") is None)
 
 
 def test_tables_say_what_they_leave_out_and_are_overwritten_by_force(capsys, grasp, tmp_path):

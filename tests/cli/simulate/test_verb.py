@@ -79,7 +79,7 @@ def test_troubles_of_the_skins(capsys, out):
     run(capsys, out, *ONE, "--faults", "zero-share=0.1, field=200")
     recording = load_recording(out / "flask-case1-1.parquet")
     assert recording.metadata["magnetic_faults"] == {
-        "field": 200.0, "turn_time": 8.0, "zero_share": 0.1, "drift": 0.0, "cross_talk": 0.0,
+        "field": 200.0, "turn_time": 8.0, "zero_share": 0.1, "drift": 0.0,
         "invented_months": 0.0,
     }  # fmt: skip
     zeros = (recording.modules["thumb"].readings == 0).all(axis=2).any(axis=1)

@@ -60,10 +60,9 @@ def test_draw_and_zoom_with_the_fingers_on_a_phone(visit, service):
         send(kind, position(page, "index", time))
     send("touchEnd")
     assert len(labels(page, "index")) == 1
-    (x, y), right = position(page, "thumb", 14), position(page, "thumb", 18)
-    send("touchStart", (x, y))
-    send("touchStart", (x, y), right)
-    send("touchMove", (x - 40, y), (right[0] + 40, y))
+    box = page.locator("#overview").bounding_box()
+    for kind, share in (("touchStart", 0.3), ("touchMove", 0.5), ("touchMove", 0.7)):
+        send(kind, (box["x"] + share * box["width"], box["y"] + box["height"] / 2))
     send("touchEnd")
     assert page.evaluate("holdfast.view.span") < 20
     assert labels(page) == []

@@ -8,6 +8,7 @@ from holdfast.detection import Tare
 from holdfast.io import load_recording, save_labels, save_recording
 from holdfast.labelling.review.content import content_of
 from holdfast.labelling.review.findings import (
+    faulty_readings,
     findings_of,
     findings_of_scan,
     hidden_labels,
@@ -16,7 +17,7 @@ from holdfast.labelling.review.findings import (
 )
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import Sensor, flat_sensor
+from holdfast.sensors import Sensor, flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
 
 
@@ -171,3 +172,33 @@ def test_what_is_odd(tmp_path, recording, expected):
 def test_gaps_are_named_with_their_times(tmp_path):
     (gaps, _) = oddities_of(timed(with_gap, "thumb"), tmp_path / "a.mcap")
     assert gaps[2].startswith("2 gaps: 0.257 s at 3.00 s, 0.107 s at 4.")
+
+
+def test_a_copy():
+    readings = np.random.default_rng(0).normal(33_000, 4, (900, 16, 3))
+    module = Tactile(sensor("uskin-4x4"), np.arange(900) / 100, readings)
+    still = replace(module, readings=np.full_like(readings, 5))
+    copies = findings_of(Recording("made", dict.fromkeys(("left", "right"), module)))
+    assert ("right", "copy") in [finding[:2] for finding in copies]
+    others = findings_of(Recording("made", dict.fromkeys(("left", "right"), still)))
+    assert "copy" not in [finding.kind for finding in others]
+
+
+def test_faulty_readings_are_findings():
+    assert faulty_readings("index", 2, 1000, []) == []
+    invalid, stuck = faulty_readings("index", 25, 1000, [2, 7])
+    assert (invalid[:2], stuck[:2]) == (("index", "invalid"), ("index", "stuck"))
+    assert "25 samples (2.5 %)" in invalid[2]
+    assert "taxels 2, 7" in stuck[2]
+
+
+def test_a_stuck_axis_is_found_in_a_recording(tmp_path):
+    which, times = sensor("anyskin"), np.arange(1000) / 100
+    readings = np.rint(np.random.default_rng(0).normal(300, 3, size=(1000, 5, 3)))
+    readings[300:, 2, 1] = 301
+    path = tmp_path / "axis.parquet"
+    save_recording(Recording("axis", {"thumb": Tactile(which, times, readings)}), path)
+    report = content_of(path, Tare.parse("0.5"))
+    assert report["modules"]["thumb"]["faults"].keys() == {"stuck"}
+    [text] = [each["text"] for each in report["findings"] if each["kind"] == "stuck"]
+    assert "taxel 3" in text

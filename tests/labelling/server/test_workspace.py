@@ -24,9 +24,11 @@ def workspace_of(*paths, **words):
 def test_a_few_recordings_are_kept_in_memory(tmp_path, monkeypatch):
     paths = [made(tmp_path, f"r{k}", k) for k in range(4)]
     loaded = []
-    load = workspace.load_for_labelling
+    load = workspace.load_recording
     monkeypatch.setattr(
-        workspace, "load_for_labelling", lambda path: (loaded.append(path.stem), load(path))[1]
+        workspace,
+        "load_recording",
+        lambda path, **options: (loaded.append(path.stem), load(path, **options))[1],
     )
     kept = Workspace(paths, author="ada", clock=lambda: NOW)
     assert [kept.summary(k).name for k in range(4)] == ["r0", "r1", "r2", "r3"]

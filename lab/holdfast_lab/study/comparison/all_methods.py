@@ -164,4 +164,6 @@ def _by_recording(
         for name, title in short_titles(plan).items()
         if name in names
     }
-    return {title: each for title, each in evaluations.items() if each is not None}
+    return {
+        title: evaluation for title, evaluation in evaluations.items() if evaluation is not None
+    }

@@ -124,16 +124,16 @@ def count_recordings(
         for index in range(len(labels))
     ]
     return {
-        method: [_count(*each) for each in zip(labels, own, common, strict=True)]
-        for method, own in estimates.items()
+        method: [_count(*arguments) for arguments in zip(labels, units, common, strict=True)]
+        for method, units in estimates.items()
     }
 
 
 def common_samples(estimates: Sequence[RecordingEstimates]) -> Mask:
     """Return the (n,) samples of the hand at which every method with estimates has one."""
     # A method without any estimate here would leave no sample; it is dropped unless all are so.
-    known = [estimate.known.array for estimate in estimates]
-    return np.asarray(np.all([each for each in known if each.any()] or known, axis=0))
+    masks = [estimate.known.array for estimate in estimates]
+    return np.asarray(np.all([mask for mask in masks if mask.any()] or masks, axis=0))
 
 
 def count_pairs(
@@ -153,8 +153,8 @@ def count_pairs(
     pairs = []
     for label, *both in zip(labels, first, second, strict=True):
         # Of the two alone, not of all methods: a method with a long history costs no samples here.
-        common = np.all([each.known.array for each in both], axis=0)
-        counts = [_count(label, each, common) for each in both]
+        common = np.all([x.known.array for x in both], axis=0)
+        counts = [_count(label, x, common) for x in both]
         by_finger = all(count.fingers for count in counts)
         scores = (
             pool([unit.scores for unit in count.units]) if by_finger else count.hand.scores
@@ -231,12 +231,12 @@ def auc_row(keys: RowKeys, scores: Sequence[SlipAgainstStable], seed: int) -> Ro
         scores: of the recordings. Those without a stable sample and without slip do not count.
         seed: of the bootstrap.
     """
-    known = [score for score in scores if len(score.stable) or len(score.slip)]
+    usable = [score for score in scores if len(score.stable) or len(score.slip)]
     interval = None
-    if len(known) >= MIN_RECORDINGS:
-        statistic = auc_of([each.stable for each in known], [each.slip for each in known])
-        interval = bootstrap_interval(statistic, len(known), seed=seed)
-    return Row(dict(keys), pool(known).auc, None, len(known), interval)
+    if len(usable) >= MIN_RECORDINGS:
+        statistic = auc_of([x.stable for x in usable], [x.slip for x in usable])
+        interval = bootstrap_interval(statistic, len(usable), seed=seed)
+    return Row(dict(keys), pool(usable).auc, None, len(usable), interval)
 
 
 def pool(scores: Sequence[SlipAgainstStable]) -> SlipAgainstStable:
@@ -299,17 +299,17 @@ def _count(labels: RecordingLabels, estimates: RecordingEstimates, common: Mask)
 
 
 def _count_unit(
-    labels: UnitLabels, estimates: UnitEstimates, known: Mask, common: Mask
+    labels: UnitLabels, estimates: UnitEstimates, decided: Mask, common: Mask
 ) -> UnitCounts:
     labelled = labels.codes.array != UNKNOWN
-    scored = labelled & known & common
+    scored = labelled & decided & common
     stable = scored & (labels.codes.array == STABLE)
     slip = scored & labels.slip.array
     called = estimates.states.array == STABLE
     probability = estimates.probability.array
     return UnitCounts(
         n_labelled=int(labelled.sum()),
-        n_without=int((labelled & ~known).sum()),
+        n_without=int((labelled & ~decided).sum()),
         n=int(scored.sum()),
         n_correct=int((scored & (stable == called)).sum()),
         n_stable=int(stable.sum()),

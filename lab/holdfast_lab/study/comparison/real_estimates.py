@@ -161,7 +161,9 @@ def method_estimates(method: str, real: Corpus, seed: int) -> list[RecordingEsti
     effort = EvaluationEffort(folds=n_folds(real), inner=1)
     job = EvaluationJob(method, real, ("recording",), effort=effort, seed=seed)
     estimates = []
-    for scored in (each for _, split in score_splits(job) for each in split):
+    for scored in (
+        scored_recording for _, split in score_splits(job) for scored_recording in split
+    ):
         recording, hand = scored.recording, scored.hand
         fingers = {
             name: unit_estimates(f.stable_probability, f.states)

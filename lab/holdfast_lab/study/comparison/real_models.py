@@ -107,7 +107,7 @@ def _estimates(model: Model | None, recording: Recording) -> RecordingEstimates:
         {name: unit_estimates(f.stable_probability, f.states) for name, f in fingers.items()},
         unit_estimates(smallest_probability(at_hand), hand.states),
         Column.of(hand.states),
-        Column.of(np.all([each.states != UNKNOWN for each in at_hand], axis=0)),
+        Column.of(np.all([unit.states != UNKNOWN for unit in at_hand], axis=0)),
     )
 
 

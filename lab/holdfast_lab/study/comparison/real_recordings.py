@@ -125,7 +125,7 @@ def tables(plan: StudyPlan, results: Results) -> list[ResultTable]:
     lines = models | {name: Line(title, THE_OTHERS) for name, title in methods}
     estimates = {name: results[_task_name(name)] for name in lines}
     counts = count_recordings(results[LABELS], estimates)
-    by_line = {lines[name]: each for name, each in counts.items()}
+    by_line = {lines[name]: counts_of_line for name, counts_of_line in counts.items()}
     source = plan.real.load()[0].metadata.get("source")
     note = f"{MEANING} {BOX_CAVEAT}" if source == uskin_pick_move.SOURCE else MEANING
     rows: list[Row] = []

@@ -92,10 +92,12 @@ def quantile_row(keys: RowKeys, values: Sequence[Sequence[float]], q: float, see
         q: from 0 to 1.
         seed: of the bootstrap.
     """
-    known: list[Array] = [np.array(value, dtype=np.float64) for value in values if len(value)]
-    ours = quantile(np.sort(np.concatenate([np.empty(0), *known])), q)
-    interval = bootstrap_interval(quantile_of(known, q), len(known), seed=seed) if known else None
-    return Row(dict(keys), ours, None, len(known), interval)
+    samples: list[Array] = [np.array(value, dtype=np.float64) for value in values if len(value)]
+    ours = quantile(np.sort(np.concatenate([np.empty(0), *samples])), q)
+    interval = (
+        bootstrap_interval(quantile_of(samples, q), len(samples), seed=seed) if samples else None
+    )
+    return Row(dict(keys), ours, None, len(samples), interval)
 
 
 def count_row(keys: RowKeys, counts: Sequence[int]) -> Row:
@@ -160,9 +162,9 @@ def difference_row(keys: RowKeys, first: Metrics, second: Metrics, seed: int) ->
 
     The interval is paired: a resample draws the same recordings for both.
     """
-    one, other = correct_and_all(first), correct_and_all(second)
-    names = [name for name in one if name in other and one[name][1] and other[name][1]]
-    counts = np.array([(*one[name], *other[name]) for name in names], dtype=np.float64)
+    errors, other = correct_and_all(first), correct_and_all(second)
+    names = [name for name in errors if name in other and errors[name][1] and other[name][1]]
+    counts = np.array([(*errors[name], *other[name]) for name in names], dtype=np.float64)
 
     def statistic(draws: Array) -> Array:
         correct, n, other_correct, other_n = (draws @ counts.reshape(-1, 4)).T

@@ -107,9 +107,9 @@ def splits(plan: StudyPlan, results: Results) -> ResultTable:
         counts: ConfusionCounts = results[f"pooled/{name}"]
         ((_, row),) = rate_rows(counts, ("accuracy",), plan.seed)
         # The paper's accuracies of the random split, beside both weights of the classes.
-        known = name.removesuffix("_unweighted")
-        paper = published.UNSEEN.get(known)
-        if known == REFERENCE_METHOD:
+        method = name.removesuffix("_unweighted")
+        paper = published.UNSEEN.get(method)
+        if method == REFERENCE_METHOD:
             paper = published.FIRST_FINGER["accuracy"]
         rows.append(Row({**keys, "split": "random"}, row.ours, paper, row.n, row.interval))
         for key, evaluation in method_results(plan, results, name):

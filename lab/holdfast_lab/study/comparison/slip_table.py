@@ -167,6 +167,6 @@ def slip_rows(keys: RowKeys, evaluation: SlipEvaluation) -> list[Row]:
 
 def hand_rate(fingers: Iterable[SlipMetrics]) -> float | None:
     """Return the false alarms of all fingers per minute in which the hand holds."""
-    known = [(each.false_alarms_per_minute["held"], each.held_minutes) for each in fingers]
-    held = max((minutes for _, minutes in known), default=0.0)
-    return sum((rate or 0.0) * minutes for rate, minutes in known) / held if held else None
+    rates = [(finger.false_alarms_per_minute["held"], finger.held_minutes) for finger in fingers]
+    held = max((minutes for _, minutes in rates), default=0.0)
+    return sum((rate or 0.0) * minutes for rate, minutes in rates) / held if held else None

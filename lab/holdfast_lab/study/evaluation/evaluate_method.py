@@ -99,9 +99,9 @@ def warm_up(method: str, rate: float) -> float:
     }
     hand = hand_signal(Recording("probe", modules), Tare.parse("none"), PROBE_FINGERS)
     features = find_method(method).features(hand)
-    known = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
+    complete = np.all([np.isfinite(rows).all(axis=1) for rows in features.values()], axis=0)
     # argmax is 0 where nothing is known: such a method takes no samples from the others.
-    return int(np.argmax(known)) / rate
+    return int(np.argmax(complete)) / rate
 
 
 class EvaluationEffort(msgspec.Struct, frozen=True):

@@ -102,9 +102,9 @@ def score_slips(scored: ScoredRecording) -> dict[str, SlipScores]:
     made = {}
     for finger, truth in scored.recording.slips.items():
         finger_scores = scored.fingers[finger]
-        times, known, touches = finger_scores.times, finger_scores.known, finger_scores.grasped
-        score = smoothed(times, np.where(known & touches, -finger_scores.margin, np.nan))
-        made[finger] = SlipScores(times, np.where(known & ~touches, -np.inf, score), truth)
+        times, decided, touches = finger_scores.times, finger_scores.known, finger_scores.grasped
+        score = smoothed(times, np.where(decided & touches, -finger_scores.margin, np.nan))
+        made[finger] = SlipScores(times, np.where(decided & ~touches, -np.inf, score), truth)
     return made
 
 
@@ -168,9 +168,9 @@ def slip_curves(scores: Mapping[str, SlipScores], ranks: Array) -> dict[str, Sli
     """
     curves = {}
     for finger, (times, score, truth) in scores.items():
-        known = probability_of(log_odds_of(score, ranks))
+        ranked = probability_of(log_odds_of(score, ranks))
         # Without contact nothing slides: no threshold may raise a slip there.
-        probability = np.where(score == -np.inf, 0.0, known)
+        probability = np.where(score == -np.inf, 0.0, ranked)
         never = np.zeros(len(times), dtype=np.bool_)
         decisions = SlipDecisions(times, probability, never, SLIP_HOLD_TIME, truth)
         curves[finger] = slip_curve(decisions)

@@ -154,9 +154,9 @@ class Scores:
             threshold: of its classifier [log odds].
             touching: (n,).
         """
-        known = ~np.isnan(margin)
-        probability = np.where(known & ~touching, 0.0, probability_of(margin + threshold))
-        return cls(times, np.where(known & touching, margin, np.inf), known, touching,
+        decided = ~np.isnan(margin)
+        probability = np.where(decided & ~touching, 0.0, probability_of(margin + threshold))
+        return cls(times, np.where(decided & touching, margin, np.inf), decided, touching,
                    probability)  # fmt: skip
 
     @classmethod
@@ -170,17 +170,17 @@ class Scores:
         rows = list(zip(fingers, last, strict=True))
         # Row -1, before the first sample of a finger, is masked by `at >= 0`.
         touches = np.array([(at >= 0) & finger.grasped[at] for finger, at in rows])
-        known = np.array([(at >= 0) & finger.known[at] for finger, at in rows])
+        decided = np.array([(at >= 0) & finger.known[at] for finger, at in rows])
         margins = np.array([finger.margin[at] for finger, at in rows])
         probability = np.array([finger.probability[at] for finger, at in rows])
         grasped = enough_contacts(touches.sum(axis=0), len(fingers))
-        counted = touches & known
+        counted = touches & decided
         smallest = np.where(counted, probability, 1.0).min(axis=0)
         smallest = np.where(counted.any(axis=0), smallest, np.nan)
         return cls(
             times,
             np.where(counted, margins, np.inf).min(axis=0),
-            np.asarray(known.all(axis=0)),
+            np.asarray(decided.all(axis=0)),
             grasped,
             np.where(grasped, smallest, 0.0),
         )

@@ -22,8 +22,8 @@ from holdfast.metrics.slip_truth import (
     slip_truth,
     truth_without,
 )
-from holdfast.metrics.truth_labels import LabelRule, relabel
-from holdfast.recordings import Recording, Truth, label_states
+from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
+from holdfast.recordings import Recording, Truth, cut_labels, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
 from holdfast_lab.study.kept import WORKER_MEMORY
@@ -138,9 +138,9 @@ class RecordingFeatures:
         codes = np.full(len(times), NOT_HELD, dtype=np.int8)
         for finger in fingers:
             # Position 0 stands for the times before the first sample of the finger.
-            own = np.append(np.int8(NOT_HELD), self.slips[finger].codes)
+            padded = np.append(np.int8(NOT_HELD), self.slips[finger].codes)
             at = np.searchsorted(self.times[finger], times, side="right")
-            codes = np.maximum(codes, own[at])
+            codes = np.maximum(codes, padded[at])
         states = np.select([codes == STILL, codes == SLIDING], [STABLE, UNSTABLE], default=UNKNOWN)
         return states.astype(np.int8)
 
@@ -153,14 +153,14 @@ def label_hand(times: Mapping[str, Array], labels: Mapping[str, Codes]) -> Finge
         labels: (n,) codes of each finger.
     """
     fingers = {
-        name: FingerDecisions(own, labels[name], labels[name], np.full(len(own), np.nan))
-        for name, own in times.items()
+        name: FingerDecisions(stamps, labels[name], labels[name], np.full(len(stamps), np.nan))
+        for name, stamps in times.items()
     }
     return hand_decisions(fingers, len(fingers))
 
 
 class PreparedRecording(NamedTuple):
-    """What every method uses of one recording: its signals, and its labels at each sample."""
+    """Signals of one recording, and its labels at each sample, for all methods."""
 
     hand: HandSignal
     labelled: RecordingFeatures
@@ -174,11 +174,11 @@ class PreparedRecording(NamedTuple):
     @property
     def n_bytes(self) -> int:
         """Size of the arrays that it adds to those of the recording [byte]."""
-        own = self.labelled
+        data = self.labelled
         arrays: list[npt.NDArray[Any]] = [finger.force for finger in self.hand.fingers.values()]
-        for by_finger in (own.amplitude, own.labels, own.exact_labels, own.calm_labels):
+        for by_finger in (data.amplitude, data.labels, data.exact_labels, data.calm_labels):
             arrays += by_finger.values()
-        arrays += [array for truth in own.slips.values() for array in (truth.codes, truth.quiet)]
+        arrays += [array for truth in data.slips.values() for array in (truth.codes, truth.quiet)]
         return sum(array.nbytes for array in arrays)
 
 
@@ -229,3 +229,21 @@ def prepared_recordings(corpus: Corpus) -> Iterator[PreparedRecording]:
         prepare = partial(PreparedRecording.of, recording, tare, fingers)
         key = (*corpus.identity, recording.name, fingers, corpus.tare)
         yield WORKER_MEMORY.get(key, prepare, attrgetter("n_bytes"))
+
+
+def relabel(recording: Recording, rule: LabelRule) -> Recording:
+    """Return the recording with labels made from its truth.
+
+    Fingers without a truth keep their labels. Labels are cut to the samples: a sensor may start
+    later than the truth.
+
+    Args:
+        recording: to label.
+        rule: thresholds and margins.
+    """
+    labels = labels_by_truth(recording, rule)
+    modules = {
+        name: replace(module, labels=cut_labels(labels[name], module)) if name in labels else module
+        for name, module in recording.modules.items()
+    }
+    return replace(recording, modules=modules) if labels else recording

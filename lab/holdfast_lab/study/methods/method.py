@@ -1,4 +1,4 @@
-"""What a method is: features of a hand, and a way to fit a classifier to them.
+"""Method of the study: features of a hand, and a way to fit a classifier to them.
 
 Every method starts from a `HandSignal`: the tared readings and forces of the fingers of one
 recording.
@@ -91,11 +91,11 @@ class FingerSignal:
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
         """The unbroken stretches: known forces without a gap longer than 3 sample periods."""
-        known = np.isfinite(self.force.sum(axis=1))
+        complete = np.isfinite(self.force.sum(axis=1))
         broken = np.diff(self.times) > GAP_LIMIT_PERIODS / self.rate
-        edges = np.flatnonzero(broken | (known[1:] != known[:-1])) + 1
-        bounds = [0, *edges.tolist(), len(known)]
-        return tuple(slice(a, b) for a, b in pairwise(bounds) if b > a and known[a])
+        edges = np.flatnonzero(broken | (complete[1:] != complete[:-1])) + 1
+        bounds = [0, *edges.tolist(), len(complete)]
+        return tuple(slice(a, b) for a, b in pairwise(bounds) if b > a and complete[a])
 
     def part(self, rows: slice) -> "FingerSignal":
         """Return the signal of some samples."""
@@ -194,15 +194,15 @@ def stretchwise(hand: HandSignal, function: Callable[[FingerSignal], Array]) -> 
         function: from a signal of n samples to (n, n_features). It is called with n = 0 too,
             for the number of features of a finger without a stretch.
     """
-    found = {}
+    rows_by_finger = {}
     for name, finger in hand.fingers.items():
         # Of an empty part: a finger without a stretch has NaN rows of the same width.
         n_features = function(finger.part(slice(0, 0))).shape[1]
         features = np.full((len(finger.times), n_features), np.nan)
         for rows, stretch in hand.each_stretch(name):
             features[rows] = function(stretch)
-        found[name] = features
-    return found
+        rows_by_finger[name] = features
+    return rows_by_finger
 
 
 def latest_rows(hand: HandSignal, rows: Mapping[str, Array], times: Array) -> Iterator[Array]:
@@ -219,12 +219,12 @@ def latest_rows(hand: HandSignal, rows: Mapping[str, Array], times: Array) -> It
     Yields:
         (m, n_features) of one finger after the other.
     """
-    for name, own in rows.items():
+    for name, finger_rows in rows.items():
         sampled = hand.fingers[name].times
         last: npt.NDArray[np.intp] = np.searchsorted(sampled, times, side="right") - 1
         # Row -1 stands for none yet; it is replaced by NaN.
-        known = (last >= 0) & (times - sampled[last] <= GAP_LIMIT_PERIODS / hand.rate)
-        yield np.where(known[:, None], own[last], np.nan)
+        is_recent = (last >= 0) & (times - sampled[last] <= GAP_LIMIT_PERIODS / hand.rate)
+        yield np.where(is_recent[:, None], finger_rows[last], np.nan)
 
 
 def windowed(values: Array, window: int, function: Callable[[Array], Array]) -> Array:

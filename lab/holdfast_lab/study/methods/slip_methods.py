@@ -13,7 +13,7 @@ from holdfast_lab.study.methods.method import Method
 from holdfast_lab.study.methods.wavelets import TREES
 
 Target = Literal["sliding", "stability"]
-"""What a method is fitted to: true sliding of a finger, or the labels of stability."""
+"""Target of a method: true sliding of a finger, or the labels of stability."""
 
 
 @dataclass(frozen=True)

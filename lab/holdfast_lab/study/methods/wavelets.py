@@ -137,14 +137,14 @@ def log_force_and_sigmas(hand: HandSignal) -> Mapping[str, Array]:
 
     Fingers without a sigma at the time are left out of the largest.
     """
-    own = log_force_and_sigma(hand)
-    sigmas = {name: rows[:, 1:] for name, rows in own.items()}
+    features = log_force_and_sigma(hand)
+    sigmas = {name: rows[:, 1:] for name, rows in features.items()}
     # fmax, not max, because it passes over the NaN of a finger.
     return {
         name: np.hstack([
             rows, np.fmax.reduce(list(latest_rows(hand, sigmas, hand.fingers[name].times)))
         ])
-        for name, rows in own.items()
+        for name, rows in features.items()
     }  # fmt: skip
 
 

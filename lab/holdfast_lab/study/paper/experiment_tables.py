@@ -205,7 +205,7 @@ def outcome_of(role: str, case: str, scored: ScoredRecording) -> GraspOutcome:
         stable_after_lock(finger.times, finger.states, truth)
         for finger in decisions.fingers.values()
     ]
-    known = [time for time in stable_after if time is not None]
+    stable_times = [time for time in stable_after if time is not None]
     return GraspOutcome(
         role=role,
         recording=recording.name,
@@ -214,8 +214,8 @@ def outcome_of(role: str, case: str, scored: ScoredRecording) -> GraspOutcome:
         contact=(int(contact[0]), int(contact[1])),
         unstable=(int(unstable[0]), int(unstable[1])),
         phases={name: (int(n), int(n_called)) for name, (n, n_called) in phases.items()},
-        first_stable=[first for first, _ in known],
-        lasting_stable=[lasting for _, lasting in known],
+        first_stable=[first for first, _ in stable_times],
+        lasting_stable=[lasting for _, lasting in stable_times],
         disturbances=find_disturbances(decisions.hand, truth),
     )
 
@@ -394,8 +394,10 @@ def single_table(by_method: Mapping[str, Sequence[GraspOutcome]], seed: int) -> 
         detected, delay = f"{short}: detected", f"{short}: delay [s]"
         digits |= {detected: 0, delay: 3}
         # The first recording with disturbances of each object; fresh ones, if there are.
-        disturbed = [one for one in outcomes if one.disturbances and one.case != "failed"]
-        role = "fresh" if any(one.role == "fresh" for one in disturbed) else "main"
+        disturbed = [
+            outcome for outcome in outcomes if outcome.disturbances and outcome.case != "failed"
+        ]
+        role = "fresh" if any(outcome.role == "fresh" for outcome in disturbed) else "main"
         first: dict[str, GraspOutcome] = {}
         for grasp in sorted(disturbed, key=lambda grasp: grasp.recording):
             if grasp.role == role:

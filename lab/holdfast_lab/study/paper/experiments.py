@@ -101,8 +101,10 @@ def predict_examples(
         training = MethodTraining.of(METHODS[name], features, seed=seed)
         for example in examples:
             # By a fit to all other main recordings.
-            own = (example.role, example.recording)
-            numbers = {k for k, each in enumerate(main.recordings) if own != ("main", each)}
+            key = (example.role, example.recording)
+            numbers = {
+                k for k, other_name in enumerate(main.recordings) if key != ("main", other_name)
+            }
             fitted = training.fit(numbers)
             if not fitted.classifiers:
                 raise TrainingError(

@@ -3,9 +3,10 @@ from dataclasses import replace
 import pytest
 
 from holdfast.contact import UNSTABLE
-from holdfast.metrics.truth_labels import LabelRule, relabel
+from holdfast.metrics.truth_labels import LabelRule
 from holdfast.recordings import label_states
 from holdfast.synthetic import synthetic_recording
+from holdfast_lab.study.evaluation.recording_features import relabel
 from study.example_recordings import recording_with_truth
 
 RECORDING = synthetic_recording("grasp", 3, ("thumb", "index"))

@@ -1,4 +1,4 @@
-"""What every hand does with commands."""
+"""Base class of hands: checks of commands, and their order."""
 
 import math
 import time
@@ -104,10 +104,11 @@ class HandDevice(Openable):
         # Raise `HandError` for a finger that the hand lacks, or a scale that is no force.
         if unknown := self._unknown(command.fingers):
             raise HandError(unknown)
-        for finger, one in command.fingers.items():
-            if not (math.isfinite(one.scale) and one.scale >= 0.0):
+        for finger, target in command.fingers.items():
+            if not (math.isfinite(target.scale) and target.scale >= 0.0):
                 raise HandError(
-                    f"{self.name}: a scale of at least 0 expected, {one.scale:g} given for {finger}"
+                    f"{self.name}: a scale of at least 0 expected, {target.scale:g} given for "
+                    f"{finger}"
                 )
         self._watch()
         # A fault neither begins a grip nor ends one: the loop may recover with the same grip.
@@ -155,7 +156,7 @@ class HandDevice(Openable):
 
     def _content(self, command: GripCommand) -> object:
         """Return what the hand gets of a command: equal for commands that are the same to it."""
-        scales = {finger: one.scale for finger, one in command.fingers.items()}
+        scales = {finger: target.scale for finger, target in command.fingers.items()}
         return command.release, None if command.release else scales
 
     @abstractmethod

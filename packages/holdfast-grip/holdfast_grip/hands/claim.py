@@ -88,13 +88,13 @@ def _open_folder(path: Path) -> int:
         path.mkdir(_FOLDER_MODE)
     # Open first and check what is open: a path can be replaced in between.
     folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW | os.O_CLOEXEC)
-    found = os.fstat(folder)
-    if found.st_uid == os.geteuid() and not found.st_mode & _FOREIGN_BITS:
+    status = os.fstat(folder)
+    if status.st_uid == os.geteuid() and not status.st_mode & _FOREIGN_BITS:
         return folder
     os.close(folder)
     raise PermissionError(
-        f"a folder of user {os.geteuid()} with mode 700 expected, one of user {found.st_uid} with "
-        f"mode {found.st_mode & 0o777:o} found"
+        f"a folder of user {os.geteuid()} with mode 700 expected, one of user {status.st_uid} with "
+        f"mode {status.st_mode & 0o777:o} found"
     )
 
 

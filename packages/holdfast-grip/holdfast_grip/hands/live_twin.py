@@ -108,8 +108,8 @@ class LiveTwin(Source, HandDevice):
         """Set the force scales from the next sample on, or release the object."""
         if self.simulation is None:
             raise HandError(f"{self.name} is not open")
-        for finger, one in command.fingers.items():
-            self._scales[FINGERS.index(finger)] = one.scale
+        for finger, target in command.fingers.items():
+            self._scales[FINGERS.index(finger)] = target.scale
         if command.release:
             self.simulation.protocol.release(self.simulation.time)
 

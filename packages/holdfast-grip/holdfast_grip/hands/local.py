@@ -70,16 +70,16 @@ class ScalarGripper(HandDevice):
         module_name, _, function = path.partition(":")
         try:
             module = _import(module_name)
-            found = getattr(module, function)
+            function_of_user = getattr(module, function)
         except (ImportError, AttributeError, ValueError) as cause:
             raise ValueError(f"{name}: call:MODULE:FUNCTION expected ({cause})") from cause
-        if not callable(found):
+        if not callable(function_of_user):
             raise ValueError(f"{name}: {path} is no function")
-        return cls(found, name, _resource(module, function))
+        return cls(function_of_user, name, _resource(module, function))
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the function, by the file that defines it."""
+        """Name of the claim: the function, by the file that defines it."""
         return self._resource
 
     def open(self) -> None:
@@ -153,7 +153,7 @@ class LogFile(HandDevice):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the file, by its real path."""
+        """Name of the claim: the file, by its real path."""
         return f"log:{os.path.realpath(self._path)}"
 
     def open(self) -> None:

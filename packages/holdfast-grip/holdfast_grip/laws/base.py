@@ -1,4 +1,4 @@
-"""What a grip law sees, and what it returns."""
+"""Input and output of a grip law."""
 
 import math
 from abc import ABC, abstractmethod

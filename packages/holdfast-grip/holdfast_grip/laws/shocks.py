@@ -9,7 +9,7 @@ jerks, and 0.01 to 0.03 when a load comes or a slide begins."""
 SHOCK_NOISE = 3.0
 """The same over the noise: the fourth root of the running mean of its fourth power. Readings that
 rest between steps have a small mean, but steps in 1 of 81 samples are noise by this measure.
-`benchmarks/shocks.py` counts the shocks in quiet holds of real sensors."""
+Shocks in quiet holds of real sensors are counted in docs/study/grip.md."""
 SHOCK_SAMPLE = 1 / 150
 """Time between two samples for which both hold [s]; they grow with a longer time, in which a load
 that comes, or an arm that moves, changes its rate more."""

@@ -89,7 +89,7 @@ LEAST_FRICTION = 0.25
 LARGEST_DOUBT = 2.0
 """Largest doubt, with the missing load, that enters a step."""
 FALLING_STEP = 0.9
-"""What a step is larger by where the hand carries less than in the calm grip: friction falls."""
+"""Growth of a step where the hand carries less than in the calm grip: friction falls."""
 HELD_SHARE = 0.9
 """Least friction that a step can show, as a share of T/N of the calm grip, which held."""
 PRESS_TIME = 0.1
@@ -102,7 +102,7 @@ UNSTABLE_SHARE = 0.7
 """Weight of an instability without a finger that is decided to slide. With 0.4 the hand answered
 too few slides of the hard plant (12 % dropped in place of 6)."""
 KICK_STEP = 0.2
-"""What a step is larger by with a slip rule, which starts fewer of them."""
+"""Growth of a step with a slip rule, which starts fewer of them."""
 RESPONSE_MARGIN = 0.04
 """Time after the response of the hand from which a slide that goes on starts another step [s]."""
 RESERVE = 3.0
@@ -217,11 +217,11 @@ class Stability(Law):
         # At most the whole step: after a pause the filter would overshoot.
         part = min(dt / SMOOTHING, 1.0)
         unstable = sliding = base = total = load = press = shock = scale = 0.0
-        known = slides = 0
+        n_known = slides = 0
         knows_slips = self._knows_slips
         for finger, touch in zip(self._fingers, touches, strict=True):
             if touch.known:
-                known += 1
+                n_known += 1
                 shock += finger.follow(touch, part)
             share, excess = finger.share, finger.doubt
             if finger.slides:
@@ -239,7 +239,7 @@ class Stability(Law):
         # The rate at which the filtered load changes.
         self._load_rate += part * ((load - self._load) / dt - self._load_rate) if dt > 0 else 0.0
         self._load, self._press, self._shock, self._scale = load, press, shock, scale
-        self._all_known, self._slides = known == len(touches), slides > 0
+        self._all_known, self._slides = n_known == len(touches), slides > 0
         self._unstable = unstable / total if total > 0 else 0.0
         self._base = base / total if total > 0 else 0.0
         # The calm grip of an object that a person still holds is not known: only slides count.

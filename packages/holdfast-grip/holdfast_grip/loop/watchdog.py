@@ -15,7 +15,6 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from types import TracebackType
 from typing import IO, Self
 
 import msgspec
@@ -153,12 +152,7 @@ class Watchdog:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         if kind is None:
             self.stop()
         else:
@@ -193,8 +187,8 @@ class Watchdog:
         if self._process is None or self._process.stdin is None:
             return
         # The bytes in the pipe that are not read yet.
-        found = fcntl.ioctl(self._process.stdin, termios.FIONREAD, bytes(4))
-        n_read = self._n_written - int.from_bytes(found, sys.byteorder)
+        n_unread = fcntl.ioctl(self._process.stdin, termios.FIONREAD, bytes(4))
+        n_read = self._n_written - int.from_bytes(n_unread, sys.byteorder)
         if n_read > self._n_read or self._read_at == -math.inf:
             self._n_read, self._read_at = n_read, now
         elif now - self._read_at > UNREAD_TIMEOUT:

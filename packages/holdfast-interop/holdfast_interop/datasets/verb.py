@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class DatasetAction(StrEnum):
-    """What the verb does."""
+    """Action of the verb."""
 
     LIST = "list"
     GET = "get"

@@ -78,14 +78,14 @@ class SharedColumns:
             self.widths[track] = max(self.widths.get(track, 1), span.width(times))
         for spec in value_specs(specs):
             name, number = feature_name(spec), stored_type(spec)
-            known = self.values.get(name, ColumnSpec(number, spec.shape))
-            pair = {known.number, number}
+            column = self.values.get(name, ColumnSpec(number, spec.shape))
+            pair = {column.number, number}
             # The type that holds the values of both exactly; only floats have one besides equals.
             common = number if len(pair) == 1 else "float64"
-            if known.shape != spec.shape or (len(pair) > 1 and pair != {"float32", "float64"}):
+            if column.shape != spec.shape or (len(pair) > 1 and pair != {"float32", "float64"}):
                 raise RecordingError(
                     f"{recording.name}: {name} has {number} of shape {spec.shape}, in the "
-                    f"recordings before {known.number} of {known.shape}; a data set has one "
+                    f"recordings before {column.number} of {column.shape}; a data set has one "
                     "shape: export them apart"
                 )
             if len(spec.shape) >= _LIMIT_AXES:

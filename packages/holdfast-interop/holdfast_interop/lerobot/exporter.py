@@ -352,15 +352,15 @@ class ColumnStatistics:
     def result(self) -> dict[str, object]:
         """Return the statistics; 0 where there is no number."""
         # JSON has neither NaN nor infinity.
-        known, n = self._n > 0, np.maximum(self._n, 1)
+        is_filled, n = self._n > 0, np.maximum(self._n, 1)
         shift = 0.0 if self._shift is None else self._shift
         with np.errstate(over="ignore", invalid="ignore"):
             mean = self._sum / n
             std = np.sqrt(np.maximum(self._squares / n - np.square(mean), 0.0))
         return {
-            "min": np.where(known, self._min, 0.0).tolist(),
-            "max": np.where(known, self._max, 0.0).tolist(),
-            "mean": np.nan_to_num(np.where(known, mean + shift, 0.0)).tolist(),
+            "min": np.where(is_filled, self._min, 0.0).tolist(),
+            "max": np.where(is_filled, self._max, 0.0).tolist(),
+            "mean": np.nan_to_num(np.where(is_filled, mean + shift, 0.0)).tolist(),
             "std": np.nan_to_num(std).tolist(),
             "count": [self._n_frames],
         }

@@ -329,18 +329,18 @@ def read_foreign_set(
             feature = info.features[name]
             # Names are a list, or lists by kind of value; they count if each value has its own.
             lists = feature.names.values() if isinstance(feature.names, dict) else [feature.names]
-            words = [str(word) for one in lists if isinstance(one, list) for word in one]
+            words = [str(word) for texts in lists if isinstance(texts, list) for word in texts]
             if not len(words) == prod(feature.shape) == len(set(words)):
                 words = []
             arrays[name] = array._replace(columns=tuple(words))
         if info.fps is not None:
             arrays["fps"] = in_memory(np.array(info.fps))
         # A file has rows of many episodes; they are recordings unless the user says otherwise.
-        own = columns or Columns()
-        if own.episode is None and EPISODE_COLUMN in arrays:
-            own = replace(own, episode=EPISODE_COLUMN)
+        layout = columns or Columns()
+        if layout.episode is None and EPISODE_COLUMN in arrays:
+            layout = replace(layout, episode=EPISODE_COLUMN)
         # The other files are like the first: one report for all.
         once = report if number == 0 else lambda _: None
         source = ForeignFile(file, arrays)
-        for recording in recordings_of(source, sensors, own, once, accept=accept):
+        for recording in recordings_of(source, sensors, layout, once, accept=accept):
             yield replace(recording, name=f"{path.name}{recording.name.removeprefix(file.stem)}")

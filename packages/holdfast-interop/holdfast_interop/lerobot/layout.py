@@ -150,7 +150,7 @@ def texts_of(texts: Mapping[str, Sequence[str]], column: str, codes: Integers) -
     Raises:
         ValueError: there is no text of a number.
     """
-    known = np.array(texts.get(column, ()), dtype=str)
-    if codes.size and not (codes.min() >= 0 and codes.max() < len(known)):
-        raise ValueError(f"{column}: a number without a text; there are {len(known)} texts")
-    return known[codes] if len(known) else np.empty(codes.shape, dtype="U1")
+    words = np.array(texts.get(column, ()), dtype=str)
+    if codes.size and not (codes.min() >= 0 and codes.max() < len(words)):
+        raise ValueError(f"{column}: a number without a text; there are {len(words)} texts")
+    return words[codes] if len(words) else np.empty(codes.shape, dtype="U1")

@@ -129,11 +129,11 @@ def write_hand(
     scale = arrow_scale(arrows)
     codes = state_codes(recording, traces)
     for name, module in arrows.items():
-        found = [module.sample_at(time, 1 / SCENE_RATE) for time in instants.tolist()]
-        rows = np.array([0 if k is None else k for k in found])
+        samples = [module.sample_at(time, 1 / SCENE_RATE) for time in instants.tolist()]
+        rows = np.array([0 if k is None else k for k in samples])
         vectors = scale * module.forces[rows]
         # No arrow in a gap: an empty row takes the last ones away.
-        shown = long_enough(vectors) & np.array([k is not None for k in found])[:, None]
+        shown = long_enough(vectors) & np.array([k is not None for k in samples])[:, None]
         times, states = codes[name]
         # Estimates begin later than readings: before the first, its colour.
         latest = np.maximum(np.searchsorted(times, instants, side="right") - 1, 0)

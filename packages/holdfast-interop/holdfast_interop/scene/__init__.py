@@ -1,1 +1,1 @@
-"""What Rerun shows of a recording: frames, arrows, series and events."""
+"""Content of a recording in Rerun: frames, arrows, series and events."""

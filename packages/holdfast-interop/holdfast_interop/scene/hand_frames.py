@@ -75,12 +75,12 @@ def frames_of(recording: Recording) -> list[Frame]:
             rest = [name for name in recording.modules if name not in tips]
             frames += object_frames(recording)
             return [*frames, *side_by_side(recording, rest)]
-    known = hand(ALLEGRO)
+    allegro = hand(ALLEGRO)
     # By name and sensor: a pad of another hand may have the name of one of this.
     on_hand = [
         name
         for name, module in recording.modules.items()
-        if name in known.modules and known.modules[name].sensor.name == module.sensor.name
+        if name in allegro.modules and allegro.modules[name].sensor.name == module.sensor.name
     ]
     rest = [name for name in recording.modules if name not in on_hand]
     if not on_hand:
@@ -89,7 +89,7 @@ def frames_of(recording: Recording) -> list[Frame]:
     tracks: dict[str, list[Array]] = {name: [] for name in on_hand}
     mounts: dict[str, tuple[str, RigidPose]] = {}
     for name in on_hand:
-        module = known.modules[name]
+        module = allegro.modules[name]
         # The hand names links by finger (`index_link3`), the table by joint, as the URDF of the
         # maker.
         link = module.link

@@ -45,18 +45,18 @@ def series(recording: Recording, traces: Traces) -> dict[str, dict[str, Track]]:
         elif module.n_samples:
             force = np.einsum("tij,ntj->ni", module.sensor.rotations, zeroed(recording, name))
             forces[name] = module.times, np.linalg.norm(force, axis=1)
-    found: dict[str, dict[str, Track]] = {"force": forces}
+    by_kind: dict[str, dict[str, Track]] = {"force": forces}
     for column in ("instability", "stable_probability", "slip_probability", "slip_speed"):
         columns = {name: (trace.times, getattr(trace, column)) for name, trace in traces.items()}
-        found[column] = {name: track for name, track in columns.items() if track[1] is not None}
+        by_kind[column] = {name: track for name, track in columns.items() if track[1] is not None}
     truth = recording.truth
     if truth is not None:
-        found["true_slip_speed"] = {
+        by_kind["true_slip_speed"] = {
             finger: (truth.times, 1000.0 * arrays["slip_speed"])  # [mm/s], as the estimate has it
             for finger, arrays in truth.fingers.items()
             if "slip_speed" in arrays and arrays["slip_speed"].ndim == 1
         }
-    return {quantity: tracks for quantity, tracks in found.items() if tracks}
+    return {quantity: tracks for quantity, tracks in by_kind.items() if tracks}
 
 
 def state_codes(recording: Recording, traces: Traces) -> dict[str, Track]:
@@ -72,7 +72,7 @@ def state_codes(recording: Recording, traces: Traces) -> dict[str, Track]:
 
 def events(recording: Recording, traces: Traces) -> list[LogEvent]:
     """Return markers, alarms, slips and faults in the order of their times."""
-    found = [LogEvent(time, False, "marker", text) for time, text in recording.markers]
+    entries = [LogEvent(time, False, "marker", text) for time, text in recording.markers]
     for finger, trace in traces.items():
         times, causes = trace.times.tolist(), trace.cause.tolist()
         # An alarm is a change from STABLE to anything else but UNKNOWN.
@@ -81,18 +81,18 @@ def events(recording: Recording, traces: Traces) -> list[LogEvent]:
             if before is ContactState.STABLE and state not in (before, ContactState.UNKNOWN):
                 why = f" ({CAUSE_BY_CODE[cause]})" if CAUSE_BY_CODE[cause] else ""
                 text = f"alarm: {state.value}{why}, was {before.value}"
-                found.append(LogEvent(time, True, finger, text))
+                entries.append(LogEvent(time, True, finger, text))
         masks = trace.faults.astype(np.int64)
         new = masks & ~np.concatenate([[0], masks[:-1]])
         for k in np.flatnonzero(new).tolist():
             text = f"fault: {', '.join(faults_of(int(new[k])))}"
-            found.append(LogEvent(times[k], True, finger, text))
+            entries.append(LogEvent(times[k], True, finger, text))
         for slip in SlipWatch().update(finger, trace.estimates()):
             if slip.end is None:
                 text = f"slip begins, probability {slip.max_probability:.2f}"
-                found.append(LogEvent(slip.begin, True, finger, text))
+                entries.append(LogEvent(slip.begin, True, finger, text))
             else:
                 far = "" if slip.distance is None else f", {slip.distance:.2f} mm"
                 text = f"slip ends after {slip.end - slip.begin:.3f} s{far}"
-                found.append(LogEvent(slip.end, False, finger, text))
-    return sorted(found)
+                entries.append(LogEvent(slip.end, False, finger, text))
+    return sorted(entries)

@@ -38,7 +38,7 @@ PARAMETERS = (
 
 
 class JointOutput(StrEnum):
-    """What a driver takes for each joint.
+    """Quantity that a driver takes for each joint.
 
     EFFORTS: the torque. LARGEST: the largest torque of its position control. POSITIONS: the
     set-point of its position control.
@@ -87,50 +87,50 @@ class JointSetup:
         return {self.topic: self.message, self.home_topic: self.message}
 
     @classmethod
-    def of(cls, given: Parameters) -> Self:
+    def of(cls, parameters: Parameters) -> Self:
         """Return the description that the URI of a hand gives.
 
         Raises:
             ValueError: a parameter is missing or not valid.
         """
-        order, output = given.joint_order(), JointOutput(given.word("command"))
+        order, output = parameters.joint_order(), JointOutput(parameters.word("command"))
         positions = output is JointOutput.POSITIONS
         # Measured torques would take the ceiling away from joints that carry little now.
         largest = output is JointOutput.LARGEST
         # A trajectory has set-points only.
-        types = [kind for kind in given.row["type"] if positions or kind != "JointTrajectory"]
-        release = given.word("release", ("limp",) if output is JointOutput.EFFORTS else ())
+        types = [kind for kind in parameters.row["type"] if positions or kind != "JointTrajectory"]
+        release = parameters.word("release", ("limp",) if output is JointOutput.EFFORTS else ())
         used = {"stiffness": positions, "home": release == "home", "home_topic": release == "home"}
-        given.only(*PARAMETERS, *(name for name in used if used[name]))
+        parameters.only(*PARAMETERS, *(name for name in used if used[name]))
         torques = None
-        if given.has("effort") or largest:
-            torques = given.joints("effort", order, each=not largest)
+        if parameters.has("effort") or largest:
+            torques = parameters.joints("effort", order, per_joint=not largest)
         n = len(order.names)
-        lowest = given.joints("lowest", order, np.full(n, -WIDEST))
-        highest = given.joints("highest", order, np.full(n, WIDEST))
+        lowest = parameters.joints("lowest", order, np.full(n, -WIDEST))
+        highest = parameters.joints("highest", order, np.full(n, WIDEST))
         if not (lowest < highest).all():
-            raise ValueError(f"{given.text}: lowest below highest expected for each joint")
-        topic = given.topic("topic")
+            raise ValueError(f"{parameters.text}: lowest below highest expected for each joint")
+        topic = parameters.topic("topic")
         home, home_topic = None, topic
         if release == "home":
-            home = given.joints("home", order, each=True)
-            home_topic = given.topic("home_topic", topic)
+            home = parameters.joints("home", order, per_joint=True)
+            home_topic = parameters.topic("home_topic", topic)
             beyond = np.maximum(lowest - home, home - highest)
             # Degrees, or angles in another order of the joints.
             if beyond[worst := int(np.argmax(beyond))] > 0.0:
                 raise ValueError(
-                    f"{given.text}: home: {order.describe(worst)}: {lowest[worst]:g} to "
+                    f"{parameters.text}: home: {order.describe(worst)}: {lowest[worst]:g} to "
                     f"{highest[worst]:g} rad expected, {home[worst]:g} given"
                 )
         return cls(
             output=output,
             topic=topic,
-            message=given.message(types),
+            message=parameters.message(types),
             order=order,
-            max_torques=given.positive_joints("max_effort", order),
+            max_torques=parameters.positive_joints("max_effort", order),
             torques=torques,
-            states=given.topic("states") if positions or torques is None else None,
-            stiffness=given.positive_joints("stiffness", order) if positions else np.ones(n),
+            states=parameters.topic("states") if positions or torques is None else None,
+            stiffness=parameters.positive_joints("stiffness", order) if positions else np.ones(n),
             lowest=lowest,
             highest=highest,
             home=home,
@@ -166,9 +166,9 @@ class JointHand(RosHand):
         setup: description of the hand.
     """
 
-    def __init__(self, link: Link, given: Parameters) -> None:
-        self.setup = setup = JointSetup.of(given)
-        super().__init__(link, given, setup.topics, setup.states)
+    def __init__(self, link: Link, parameters: Parameters) -> None:
+        self.setup = setup = JointSetup.of(parameters)
+        super().__init__(link, parameters, setup.topics, setup.states)
         self.fingers = setup.order.fingers
         self._max_scale = 1.0
         self._grip: JointGrip | None = None
@@ -190,16 +190,19 @@ class JointHand(RosHand):
             raise ValueError(problem)
 
     def _begin(self) -> None:
-        given = self.setup.torques
+        setup_torques = self.setup.torques
         n = len(self.setup.order.names)
-        states = [one for _, one in self._states]
+        states = [joint_state for _, joint_state in self._states]
         # NaN without joint states, and no torques where a state has none.
-        positions, torques = np.full(n, np.nan), np.zeros(n) if given is None else given
+        positions, torques = (
+            np.full(n, np.nan),
+            np.zeros(n) if setup_torques is None else setup_torques,
+        )
         if states:
             positions = np.median([state.positions for state in states], axis=0)
             efforts = [state.efforts for state in states if len(state.efforts)]
             # A median of some of the states would be of another time than the positions.
-            if given is None and len(efforts) == len(states):
+            if setup_torques is None and len(efforts) == len(states):
                 torques = np.median(efforts, axis=0)
         if not torques.any():
             raise HandError(

@@ -38,7 +38,9 @@ class JointOrder:
     def scales(self, command: GripCommand) -> Array:
         """Return the force scale (n_joints,) of each joint; 1 for fingers without a command."""
         commands = [command.fingers.get(finger) for finger, _ in self._joints]
-        return np.array([1.0 if one is None else one.scale for one in commands])
+        return np.array(
+            [1.0 if joint_command is None else joint_command.scale for joint_command in commands]
+        )
 
     def describe(self, joint: int) -> str:
         """Return the finger and the number of a joint in it, from 0: "index joint 2"."""

@@ -40,13 +40,13 @@ class Parameters:
         """Whether other publishers of the topics of the commands are allowed."""
         return self.word("shared", ("false", "true")) == "true"
 
-    def only(self, *known: str) -> None:
+    def only(self, *names: str) -> None:
         """Check that all given parameters are known; those of every hand are.
 
         Raises:
-            ValueError: one is not among `known`.
+            ValueError: one is not among `names`.
         """
-        self._address.only(*COMMON, *known)
+        self._address.only(*COMMON, *names)
 
     def has(self, name: str) -> bool:
         """Return whether a parameter is given."""
@@ -63,7 +63,7 @@ class Parameters:
         return self._numbers(name, (1,), "a number")[0]
 
     def joints(
-        self, name: str, order: JointOrder, default: Array | None = None, *, each: bool = False
+        self, name: str, order: JointOrder, default: Array | None = None, *, per_joint: bool = False
     ) -> Array:
         """Return a value for each joint (n,), in the order of the messages.
 
@@ -71,7 +71,7 @@ class Parameters:
             name: name of the parameter.
             order: the joints.
             default: value where neither the URI nor the row has one.
-            each: whether one number for all joints is refused.
+            per_joint: whether one number for all joints is refused.
 
         Raises:
             ValueError: there are not `n` numbers, or the parameter is missing.
@@ -81,9 +81,9 @@ class Parameters:
         if name not in self._given and default is not None:
             return default
         n = len(order.names)
-        sizes, text = ((n,), "") if each else ((1, n), "a number or ")
-        found = self._numbers(name, sizes, f"{text}{n} numbers, one for each joint,")
-        return np.full(n, found[0]) if len(found) == 1 else np.array(found)
+        sizes, text = ((n,), "") if per_joint else ((1, n), "a number or ")
+        numbers = self._numbers(name, sizes, f"{text}{n} numbers, one for each joint,")
+        return np.full(n, numbers[0]) if len(numbers) == 1 else np.array(numbers)
 
     def positive_joints(self, name: str, order: JointOrder) -> Array:
         """Return a value above 0 for each joint, as `joints`."""
@@ -109,8 +109,8 @@ class Parameters:
         """
         topic = self._given.get(name, self.row.get(name, default))
         if topic is None or not _TOPIC.fullmatch(topic):
-            given = "nothing" if topic is None else repr(topic)
-            raise ValueError(f"{self.text}: {name}=/TOPIC expected, {given} given")
+            shown = "nothing" if topic is None else repr(topic)
+            raise ValueError(f"{self.text}: {name}=/TOPIC expected, {shown} given")
         return str(topic)
 
     def word(self, name: str, words: Sequence[str] = ()) -> str:
@@ -136,22 +136,24 @@ class Parameters:
         Raises:
             ValueError: it has another form, a name occurs twice, or the hand has other joints.
         """
-        known, given = self.row.get("joints"), self._given.get("joints")
-        if known and given is None:
-            return JointOrder(known)
-        parts = [part.split(":") for part in (given or "").split(",")]
+        joints, stated = self.row.get("joints"), self._given.get("joints")
+        if joints and stated is None:
+            return JointOrder(joints)
+        parts = [part.split(":") for part in (stated or "").split(",")]
         order = {finger: names for finger, *names in parts}
         names = [name for names in order.values() for name in names]
         is_complete = all(len(part) > 1 and all(part) for part in parts)
         if not is_complete or len(order) < len(parts) or len({*names}) < len(names):
-            text = "nothing" if given is None else repr(given)
+            text = "nothing" if stated is None else repr(stated)
             raise ValueError(
                 f"{self.text}: joints=thumb:JOINT:JOINT,index:JOINT expected, each name once, "
                 f"{text} given"
             )
-        if known and {key: len(order[key]) for key in order} != {k: len(known[k]) for k in known}:
-            fingers = ", ".join(f"{len(known[finger])} of {finger}" for finger in known)
-            raise ValueError(f"{self.text}: joints: {fingers} expected, {given!r} given")
+        if joints and {key: len(order[key]) for key in order} != {
+            k: len(joints[k]) for k in joints
+        }:
+            fingers = ", ".join(f"{len(joints[finger])} of {finger}" for finger in joints)
+            raise ValueError(f"{self.text}: joints: {fingers} expected, {stated!r} given")
         return JointOrder(order)
 
     def name(self, name: str) -> str:
@@ -167,11 +169,11 @@ class Parameters:
     def _numbers(self, name: str, sizes: Sequence[int], expected: str) -> list[float]:
         text = self._given.get(name)
         try:
-            found = [float(part) for part in (text or "").split(",")]
+            numbers = [float(part) for part in (text or "").split(",")]
         except ValueError:
             # Text gets the message of a wrong number of values.
-            found = []
-        if len(found) not in sizes or not all(map(math.isfinite, found)):
-            given = "nothing" if text is None else repr(text)
-            raise ValueError(f"{self.text}: {name}: {expected} expected, {given} given")
-        return found
+            numbers = []
+        if len(numbers) not in sizes or not all(map(math.isfinite, numbers)):
+            shown = "nothing" if text is None else repr(text)
+            raise ValueError(f"{self.text}: {name}: {expected} expected, {shown} given")
+        return numbers

@@ -1,4 +1,4 @@
-"""What all hands on topics share: how they are opened, and what is checked at each command."""
+"""Base class of hands on topics: their opening, and the checks at each command."""
 
 import time
 from abc import abstractmethod
@@ -50,11 +50,11 @@ class RosHand(HandDevice):
     """
 
     def __init__(
-        self, link: Link, given: Parameters, topics: Mapping[str, str], states: str | None
+        self, link: Link, parameters: Parameters, topics: Mapping[str, str], states: str | None
     ) -> None:
-        self.name = given.text
+        self.name = parameters.text
         self._link, self._topics = link, dict(topics)
-        self._states_topic, self._shared = states, given.shared
+        self._states_topic, self._shared = states, parameters.shared
         self._publishers: dict[str, Publisher] = {}
         self._take_states: TakeStates | None = None
         # Valid joint states and when they were read, newest last; `_poll` adds and drops them.
@@ -65,7 +65,7 @@ class RosHand(HandDevice):
 
     @property
     def resource(self) -> str:
-        """What only one controller may command: the topic of the commands."""
+        """Name of the claim: the topic of the commands."""
         return f"{next(iter(self._topics))} {self._link.where}"
 
     @property

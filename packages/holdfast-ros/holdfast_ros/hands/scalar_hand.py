@@ -63,26 +63,26 @@ class Width:
     stroke: float
 
     @classmethod
-    def of(cls, given: Parameters, opened: float, closed: float) -> Self:
+    def of(cls, parameters: Parameters, opened: float, closed: float) -> Self:
         """Return the description that the URI of a gripper gives.
 
         Raises:
             ValueError: a parameter is missing or not valid.
         """
-        stroke = given.positive("stroke", abs(opened - closed))
+        uri, stroke = parameters.text, parameters.positive("stroke", abs(opened - closed))
         if stroke > MAX_STROKE:
             raise ValueError(
-                f"{given.text}: a stroke of at most {MAX_STROKE:g} m expected, {stroke:g} given: "
+                f"{uri}: a stroke of at most {MAX_STROKE:g} m expected, {stroke:g} given: "
                 "give open= and closed= in metres, or stroke= [m] beside them"
             )
-        stiffness = given.positive("stiffness")
-        gain = given.positive("gain", math.inf)
+        stiffness = parameters.positive("stiffness")
+        gain = parameters.positive("gain", math.inf)
         if gain < stiffness:
             raise ValueError(
-                f"{given.text}: gain: at least the stiffness of {stiffness:g} N/m expected, of "
+                f"{uri}: gain: at least the stiffness of {stiffness:g} N/m expected, of "
                 f"which it is a part, {gain:g} given"
             )
-        joint, states = given.name("joint"), given.topic("states")
+        joint, states = parameters.name("joint"), parameters.topic("states")
         return cls(joint, states, stiffness, gain, opened, closed, stroke)
 
     def at(self, position: float) -> float:
@@ -130,32 +130,32 @@ class ScalarSetup:
     width: Width | None
 
     @classmethod
-    def of(cls, given: Parameters) -> Self:
+    def of(cls, parameters: Parameters) -> Self:
         """Return the description that the URI of a hand gives.
 
         Raises:
             ValueError: a parameter is missing or not valid.
         """
-        by_width, message = given.word("command") == "width", given.message()
-        moves, home = by_width or message == GRIPPER_COMMAND, given.word("release") == "home"
+        by_width, message = parameters.word("command") == "width", parameters.message()
+        moves, home = by_width or message == GRIPPER_COMMAND, parameters.word("release") == "home"
         used = {"closed": moves, "home_topic": home} | dict.fromkeys(WIDTH_PARAMETERS, by_width)
-        given.only(*PARAMETERS, *(name for name in used if used[name]))
-        opened = given.number("open", None if moves else 0.0)
-        closed = given.number("closed", 0.0)
+        parameters.only(*PARAMETERS, *(name for name in used if used[name]))
+        opened = parameters.number("open", None if moves else 0.0)
+        closed = parameters.number("closed", 0.0)
         if moves and opened == closed:
             raise ValueError(
-                f"{given.text}: open= another position than closed= expected, {opened:g} given"
+                f"{parameters.text}: open= another position than closed= expected, {opened:g} given"
             )
         return cls(
-            topic=given.topic("topic"),
+            topic=parameters.topic("topic"),
             message=message,
-            effort=given.positive("effort"),
-            max_effort=given.positive("max_effort"),
+            effort=parameters.positive("effort"),
+            max_effort=parameters.positive("max_effort"),
             opened=opened,
             closed=closed,
-            home_topic=given.topic("home_topic") if home else None,
-            fingers=tuple(given.row["fingers"]) if "fingers" in given.row else None,
-            width=Width.of(given, opened, closed) if by_width else None,
+            home_topic=parameters.topic("home_topic") if home else None,
+            fingers=tuple(parameters.row["fingers"]) if "fingers" in parameters.row else None,
+            width=Width.of(parameters, opened, closed) if by_width else None,
         )
 
 
@@ -172,12 +172,14 @@ class ScalarHand(RosHand):
         setup: description of the hand.
     """
 
-    def __init__(self, link: Link, given: Parameters) -> None:
-        self.setup = setup = ScalarSetup.of(given)
+    def __init__(self, link: Link, parameters: Parameters) -> None:
+        self.setup = setup = ScalarSetup.of(parameters)
         topics = {setup.topic: setup.message}
         if setup.home_topic is not None:
             topics[setup.home_topic] = STRING
-        super().__init__(link, given, topics, None if setup.width is None else setup.width.states)
+        super().__init__(
+            link, parameters, topics, None if setup.width is None else setup.width.states
+        )
         self.fingers = setup.fingers
         self._max_scale = 1.0
         self._begin_width = 0.0

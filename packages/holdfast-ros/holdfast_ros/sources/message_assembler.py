@@ -66,24 +66,28 @@ class MessageAssembler:
         Raises:
             SourceError: they do not fit the arguments of the assembler.
         """
-        found = {device_number(sample): sample for sample in samples if has_taxels(sample)}
-        for number, one in found.items():
-            if one.counts is not None and self._unit == "N" and not len(one.forces):
-                raise SourceError(no_calibration(number, one.model))
+        by_number = {device_number(sample): sample for sample in samples if has_taxels(sample)}
+        for number, sent in by_number.items():
+            if sent.counts is not None and self._unit == "N" and not len(sent.forces):
+                raise SourceError(no_calibration(number, sent.model))
         # Those of XELA's server have models of their own.
-        if any(one.model in (PAPILLARRAY, PAD) for one in found.values()):
-            if unknown := sorted(set(self._names) - set(found)):
-                there = ", ".join(f"{number} ({one.model})" for number, one in found.items())
+        if any(sent.model in (PAPILLARRAY, PAD) for sent in by_number.values()):
+            if unknown := sorted(set(self._names) - set(by_number)):
+                there = ", ".join(f"{number} ({sent.model})" for number, sent in by_number.items())
                 raise SourceError(f"fingers= names {unknown[0]}; the topic has {there}")
-            devices = {number: self._pad(number, one) for number, one in found.items()}
+            devices = {number: self._pad(number, sent) for number, sent in by_number.items()}
         else:
-            models = {n: (x.model, len(readings_of(x, self._unit))) for n, x in found.items()}
+            models = {n: (x.model, len(readings_of(x, self._unit))) for n, x in by_number.items()}
             calibrated = self._unit == "N"
             devices = xela_devices(models, self._names, self._sensor, calibrated=calibrated)
         self._assembler.devices = devices
         # One kind for all devices: stamps of two clocks have no common order.
         self._stamp = next(
-            (stamp for stamp in _STAMPS if any(stamp(one) is not None for one in found.values())),
+            (
+                stamp
+                for stamp in _STAMPS
+                if any(stamp(sent) is not None for sent in by_number.values())
+            ),
             None,
         )
 
@@ -99,7 +103,7 @@ class MessageAssembler:
             received: time of arrival, on the host's monotonic clock [s].
         """
         new = [sample for sample in samples if self._is_new(sample, received)]
-        stamps = [received if self._stamp is None else self._stamp(one) for one in new]
+        stamps = [received if self._stamp is None else self._stamp(x) for x in new]
         newest = max((stamp for stamp in stamps if stamp is not None), default=None)
         if newest is not None:
             self._assembler.stamp(newest, received)

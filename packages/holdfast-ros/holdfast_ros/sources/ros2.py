@@ -110,8 +110,8 @@ class Subscription:
                 raise SourceError(self.why_no_message())
             time.sleep(DISCOVERY_INTERVAL)
         try:
-            given = self._definition
-            definition = own_definition(kind, given) if given else known_definition(kind)
+            stated = self._definition
+            definition = own_definition(kind, stated) if stated else known_definition(kind)
             if definition is None:
                 raise SourceError(
                     f"{self._topic} has messages of type {kind}; supported types: {SUPPORTED_TYPES}"
@@ -125,9 +125,9 @@ class Subscription:
     def take(self, timeout: float) -> ReceivedMessage | None:
         """Return the next message, or None after `timeout` [s]."""
         if not self._queue and self._reader is not None:
-            found = self._reader.take(timeout)
+            messages = self._reader.take(timeout)
             received = time.monotonic()
-            self._queue.extend(ReceivedMessage(data, received) for data in found)
+            self._queue.extend(ReceivedMessage(data, received) for data in messages)
         return self._queue.popleft() if self._queue else None
 
     def decode(self, data: bytes) -> list[DeviceSample]:
@@ -207,7 +207,7 @@ class TopicSource(DeviceSource):
     def _first_messages(self, deadline: float) -> tuple[list[ReceivedMessage], list[DeviceSample]]:
         """Return the first messages, until a device repeats, and the first sample of each."""
         messages: list[ReceivedMessage] = []
-        found: dict[int | None, DeviceSample] = {}
+        first_samples: dict[int | None, DeviceSample] = {}
         invalid: ValueError | None = None
         while (left := deadline - time.monotonic()) > 0:
             message = self._subscription.take(left)
@@ -218,16 +218,16 @@ class TopicSource(DeviceSource):
             except ValueError as why:
                 invalid = why
                 continue
-            samples = [one for one in decoded if has_taxels(one)]
+            samples = [device_sample for device_sample in decoded if has_taxels(device_sample)]
             messages.append(message)
             # A device that comes again has come after all others.
-            if any(sample.number in found for sample in samples):
+            if any(sample.number in first_samples for sample in samples):
                 break
-            if samples and not found:
+            if samples and not first_samples:
                 deadline = min(deadline, time.monotonic() + DEVICES_TIMEOUT)
-            found.update((sample.number, sample) for sample in samples)
-        if found:
-            return messages, list(found.values())
+            first_samples.update((sample.number, sample) for sample in samples)
+        if first_samples:
+            return messages, list(first_samples.values())
         if invalid is not None:
             raise SourceError(f"{self.name} sends invalid messages: {invalid}") from invalid
         raise SourceError(self._subscription.why_no_message())

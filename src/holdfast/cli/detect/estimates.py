@@ -60,7 +60,7 @@ def detect_recording(
 def _read_parts(
     model: Model, path: Path, rate: RatePolicy, recording: Recording | None
 ) -> Iterator[Recording]:
-    """Yield the recording, that of the path if it is None, at the model's rate.
+    """Yield the recording at the model's rate; it is read from the path if it is None.
 
     It comes in parts, or as a whole if it is resampled or its tare is an interval.
     """
@@ -88,10 +88,10 @@ def _read_parts(
         if Tare.parse(model.tare).kind == "interval":
             return iter([whole()])  # the interval may lie after the first part
         return chain([first], parts)
-    given = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
+    text = f"{path}: {first.rate:.4g} Hz given, the model expects {model.rate:g} Hz"
     if rate is RatePolicy.STRICT:
-        raise ModelError(f"{given} within 20 % (--rate resample accepts it)")
-    print_message(f"{given}: resampled")
+        raise ModelError(f"{text} within 20 % (--rate resample accepts it)")
+    print_message(f"{text}: resampled")
     return iter([resample(whole(), model.rate)])
 
 

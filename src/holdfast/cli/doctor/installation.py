@@ -15,8 +15,8 @@ from holdfast.errors import (
     other_project,
     package_versions,
 )
+from holdfast.kernel.batch import usable_processors
 from holdfast.removed import REMOVED
-from holdfast.threads import usable_processors
 
 
 def installation() -> dict[str, Any]:
@@ -62,14 +62,14 @@ def installation() -> dict[str, Any]:
 def print_installation(report: dict[str, Any]) -> None:
     """Print tables of what `installation` returns."""
     kernels, data, limits = report["kernels"], report["data"], report["limits"]
-    found = "found" if data["found"] else "NOT FOUND"
+    presence = "found" if data["found"] else "NOT FOUND"
     held = ", ".join(name for name, holds in limits.items() if holds)
     lacking = ", ".join(name for name, holds in limits.items() if not holds)
     rows = [(key, report[key]) for key in ("python", "platform", "cpus")]
     rows += [
         ("kernel", "works" if kernels["ok"] else kernels["error"]),
         ("limits of imports", (held or "none") + (f" (NOT {lacking})" if lacking else "")),
-        ("HOLDFAST_DATA", "not set" if data["path"] is None else f"{data['path']} ({found})"),
+        ("HOLDFAST_DATA", "not set" if data["path"] is None else f"{data['path']} ({presence})"),
     ]
     packages = [(name, version or "MISSING") for name, version in report["packages"].items()]
     extras = [

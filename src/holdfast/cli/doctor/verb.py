@@ -1,6 +1,5 @@
 """`holdfast doctor`: check the installation and the live sources, or the modules of a source."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +10,7 @@ from holdfast.cli.terminal.console import print_json, print_line, print_paragrap
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-HEALTHY = "nothing is wrong, and nothing is worse than at the last check"
+HEALTHY = "nothing is wrong"
 
 
 def doctor(
@@ -21,10 +20,6 @@ def doctor(
     *,
     figure: PlotOptions,
     seconds: Annotated[float, typer.Option(help="Duration of the check [s].")] = 10.0,
-    history: Annotated[
-        Path | None,
-        typer.Option(help="File of the checks of this source; by default in the state folder."),
-    ] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Check the installation and the sources, or the modules of one.
@@ -36,8 +31,7 @@ def doctor(
 
     With SOURCE, read ten seconds of the open hand, up to the first touch, and report for each
     module the rate, the jitter, the gaps, the noise by axis and of the loudest taxel, dead and
-    stuck taxels, zeros, the range, and the magnetic field, if you turn the hand. The check is
-    kept, and compared with the last one.
+    stuck taxels, zeros, the range, and the magnetic field, if you turn the hand.
 
     Example:
       holdfast doctor
@@ -45,35 +39,32 @@ def doctor(
       holdfast doctor xela://auto --plot health.png
     """
     if source is not None:
-        check_modules(source, seconds, history, figure, as_json=as_json)
+        check_modules(source, seconds, figure, as_json=as_json)
         return
-    if figure.plot is not None or history is not None:
-        raise ValueError("--plot and --history are for the modules of a source; SOURCE expected")
+    if figure.plot is not None:
+        raise ValueError("--plot is for the modules of a source; SOURCE expected")
     from holdfast.cli.doctor.installation import installation, print_installation
 
     report = installation()
     print_json(report) if as_json else print_installation(report)
 
 
-def check_modules(
-    uri: str, seconds: float, history: Path | None, figure: PlotOptions, *, as_json: bool
-) -> None:
-    """Check the modules of a source, and print what is wrong or worse than at the last check.
+def check_modules(uri: str, seconds: float, figure: PlotOptions, *, as_json: bool) -> None:
+    """Check the modules of a source, and print what is wrong.
 
     Args:
         uri: of the source, or path of a recording.
         seconds: duration of the check [s].
-        history: file of the checks; by default in the state folder.
         figure: of the noise of each taxel.
         as_json: print JSON.
 
     Raises:
-        SourceError: too few samples arrive, a module is touched from the start, or the file is no
-            history.
+        SourceError: too few samples arrive, or a module is touched from the start.
     """
     from msgspec import to_builtins
 
-    from holdfast.live.health import check_and_keep, history_path, table_of
+    from holdfast.devices.sources import open_source
+    from holdfast.live.health import check_health, findings_of, table_of
 
     def draw() -> "Figure":
         from holdfast.plots.sensors import plot_noise
@@ -82,12 +73,12 @@ def check_modules(
 
     check_seconds(seconds)
     figure.check()  # before ten seconds are read
-    path = history_path(uri) if history is None else history
-    check, last, findings = check_and_keep(uri, seconds, path)
+    with open_source(uri, speed=0) as source:
+        check = check_health(source, seconds)
+    findings = findings_of(check)
     figure.save(draw)
     if as_json:
-        report = to_builtins(check) | {"last": last and last.date, "findings": findings}
-        print_json(report | {"history": str(path)})
+        print_json(to_builtins(check) | {"findings": findings})
         return
     header = ("module", "rate [Hz]", "jitter [ms]", "gaps", "zeros", "noise x y z",
               "loudest (taxel)", "readings", "field")  # fmt: skip

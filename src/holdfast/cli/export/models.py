@@ -59,7 +59,6 @@ def export_model(
         HoldfastError: the model cannot be exported.
     """
     from holdfast.detection import Model
-    from holdfast.detection.c_header import code_size
     from holdfast.exporters import export as write
     from holdfast.exporters import fingers_of_sensor
     from holdfast.io import load_recording
@@ -79,7 +78,6 @@ def export_model(
         in_contact=options.in_contact, force=force,
     )  # fmt: skip
     header = written.header
-    code = code_size(header)
     if as_json:
         document = {
             "out": written.path,
@@ -87,7 +85,6 @@ def export_model(
             "size": written.size,
             "state_size": header.state_size,
             "constants_size": header.constants_size,
-            "code_size": code,
             "double_fields": header.double_fields,
         }
         print_json(document)
@@ -95,7 +92,5 @@ def export_model(
         print_line(f"{written.path}: the detector of {', '.join(written.fingers)}")
         print_line(f"  state      {header.state_size:9} bytes, one for each hand")
         print_line(f"  constants  {header.constants_size:9} bytes")
-        known = f"{code:9} bytes" if code is not None else "not known: no cc and size are installed"
-        print_line(f"  code       {known}")
         if header.double_fields:
             print_line(f"  double     {', '.join(header.double_fields)}: they hold times")

@@ -105,16 +105,17 @@ def exporter_of(out: Path, name: str | None, others: ExporterOptions) -> Any:  #
     if name is None:
         raise ValueError(f"--format: {', '.join(names)} expected for recordings")
     plugin = None if name == CSV else EXPORTER_PLUGINS.require(name, f"the format {name}", names)
-    own = [] if plugin is None else flags_of(plugin.OPTIONS)
+    flags = [] if plugin is None else flags_of(plugin.OPTIONS)
     for other, chosen, values in others.chosen():
         if other != name:
-            given = [
+            foreign_flags = [
                 flag
                 for flag, value in zip(flags_of(values), astuple(values), strict=True)
-                if flag not in own and value != getattr(chosen.OPTIONS, flag[2:].replace("-", "_"))
+                if flag not in flags
+                and value != getattr(chosen.OPTIONS, flag[2:].replace("-", "_"))
             ]
-            if given:
-                raise ValueError(f"{given[0]} belongs to --format {other}; {name} given")
+            if foreign_flags:
+                raise ValueError(f"{foreign_flags[0]} belongs to --format {other}; {name} given")
     # A table is one file of its format; all other formats write a folder.
     if out.suffix in FILE_SUFFIXES and name != out.suffix[1:]:
         raise ValueError(f"{out}: a folder expected for the format {name}, a file given")

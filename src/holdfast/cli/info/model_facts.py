@@ -1,4 +1,4 @@
-"""What `info` says of a model."""
+"""Facts about a model for `holdfast info`."""
 
 from typing import Any
 

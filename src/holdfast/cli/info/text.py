@@ -9,7 +9,7 @@ from holdfast.cli.terminal.console import print_line, print_lines, print_paragra
 MAX_VALUE_LENGTH = 90
 """Maximum number of characters of a metadata value in the table."""
 ANSWERS = {"stable": "STABLE", "slip": "slides", "slip_changes": "slides, begun in contact,"}
-"""What a finger does from the threshold of a head on."""
+"""Answer of a head whose value reaches its threshold."""
 # As the documents of `content_of` name them; an import of them would slow the start of the verb.
 LABELLED_STATES = ("stable", "unstable", "no_contact")
 LABEL_HEADINGS = tuple(f"{state} [s]" for state in LABELLED_STATES)
@@ -144,9 +144,11 @@ def _rows(document: dict[str, Any]) -> Iterator[tuple[str, str]]:
         finger = "any finger" if name == "*" else name
         sensor = f"{part['sensor']} ({part['unit']})" if part["sensor"] else "any"
         yield finger, f"sensor {sensor}; {_contact(part)}"
-        known = part["heads"]["stable"]["features"]
+        stable_features = part["heads"]["stable"]["features"]
         is_own = bool(part["handling"])
-        heads = (line for x in part["heads"].values() for line in _head_lines(x, known, is_own))
+        heads = (
+            line for x in part["heads"].values() for line in _head_lines(x, stable_features, is_own)
+        )
         yield from (("", line) for line in heads)
         if "slip" not in part["heads"]:
             yield "", "no slip rule"
@@ -174,7 +176,7 @@ def _contact(part: dict[str, Any]) -> str:
     return "no threshold of contact"
 
 
-def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterator[str]:
+def _head_lines(head: dict[str, Any], stable_features: list[str], is_own: bool) -> Iterator[str]:
     """Yield what a head answers, from which features, and on what its threshold was chosen.
 
     Of features that `stable` has not, the first are named. Of a calibrated model, the lines of own
@@ -190,7 +192,7 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     if head["classes"]:
         texts.append(", ".join(head["classes"]))
     yield f"{name}: {'; '.join(texts)}"
-    added = [feature for feature in head["features"] if feature not in known]
+    added = [feature for feature in head["features"] if feature not in stable_features]
     yield f"  of them new {_few(added)}" if added else f"  features {_few(head['features'])}"
     if (choice := head["choice"]) is None:
         return
@@ -199,11 +201,11 @@ def _head_lines(head: dict[str, Any], known: list[str], is_own: bool) -> Iterato
     # A slip is scored within a shorter time than a state, and per time of one held finger.
     is_stable = name == "stable"
     events, time, within = ("events", "stable", 0.2) if is_stable else ("slips", "held", 0.1)
-    found = "" if choice["found"] is None else f"; {choice['found']:.0f} % found within {within} s"
+    share = "" if choice["found"] is None else f"; {choice['found']:.0f} % found within {within} s"
     yield (
         f"  threshold from {origin}: {choice['false_alarms_per_minute']:.2g} false alarms a minute "
         f"(at most {choice['requested']:g} wanted) in {choice['minutes']:.3g} min of {time} time; "
-        f"{choice['n']} {events}{found}"
+        f"{choice['n']} {events}{share}"
     )
 
 

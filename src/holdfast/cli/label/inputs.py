@@ -155,8 +155,8 @@ class RuleOptions:
         arguments = self.arguments(rule)
         beside = None if path is None else path.with_suffix(".mp4")
         # A default: the video of the option, which `arguments` has, is not replaced.
-        given = self.poses or self.motion
-        if rule == "tracking" and not given and beside is not None and beside.exists():
+        file = self.poses or self.motion
+        if rule == "tracking" and not file and beside is not None and beside.exists():
             arguments.setdefault("video", beside)
         if "video" in arguments:
             require_extras("video")

@@ -9,7 +9,6 @@ import typer
 from holdfast.cli.options import RARE, SeedOption
 
 if TYPE_CHECKING:
-    from holdfast.parallel import Engine
     from holdfast.twin.simulation import Grasp
 
 
@@ -57,12 +56,12 @@ class GraspOptions:
         str,
         typer.Option(
             help="Troubles of magnetic skins, as field=300,turn-time=3,zero-share=0.02,drift=20000,"
-            "cross-talk=0.1,invented-months=4 (counts, s, shares, counts an hour, months)."
+            "invented-months=4 (counts, s, shares, counts an hour, months)."
         ),
         RARE,
     ] = ""
 
-    def plan(self, engine: "Engine") -> "list[Grasp]":
+    def plan(self) -> "list[Grasp]":
         """Return the grasps of an Allegro hand.
 
         Raises:
@@ -70,8 +69,7 @@ class GraspOptions:
         """
         from holdfast.simulated_grasps import plan_grasps
 
-        table = None if self.table is None else engine.path(self.table)
         return plan_grasps(
             self.objects, self.cases, self.repeats, self.profile, self.seed,
-            server=self.server, table=table, faults=self.faults, sensor=self.sensor,
+            server=self.server, table=self.table, faults=self.faults, sensor=self.sensor,
         )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.extensions import SimulatorOptions
-from holdfast.cli.options import RARE, EngineOptions, ForceOption, FpsOption, JsonOption
+from holdfast.cli.options import DEFAULT_JOBS, ForceOption, FpsOption, JobsOption, JsonOption
 from holdfast.cli.simulate.options import GraspOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
@@ -20,14 +20,7 @@ def simulate(
     *,
     options: GraspOptions,
     simulators: SimulatorOptions,
-    parallel: EngineOptions,
-    film: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write a film of the first grasp to this .gif, .png, .webp or .mp4 file."
-        ),
-        RARE,
-    ] = None,
+    jobs: JobsOption = DEFAULT_JOBS,
     video: Annotated[
         bool,
         typer.Option(
@@ -51,8 +44,7 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --engine, --jobs and --force apply then (--help-all). With --engine
-    dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
+    --repeats, --grasps, --seed, --jobs and --force apply then (--help-all).
 
     Example:
       holdfast simulate twin/ --jobs -1
@@ -62,28 +54,21 @@ def simulate(
       holdfast simulate filmed/ --profile slips --cases 2 --repeats 1 --video
     """
     require_extras("twin", "parquet", *(("video",) if video else ()))
-    engine = parallel.start()
+    from holdfast.parallel import Engine
+
+    engine = Engine(jobs)
     if chosen := simulators.chosen():
         profile, simulator, values = chosen[0]
         names = simulator.simulate(out, options, values, engine=engine, force=force)
         text = f"{len(names)} recordings of {profile} hands in {out}"
     else:
-        from holdfast.files import refuse_overwrite, whole_file
         from holdfast.simulated_grasps import film_all, simulate_grasps
-        from holdfast.twin import render
 
-        if film is not None:
-            render.check_film(film)
-            refuse_overwrite(film, force=force)  # before minutes of simulation
-        profile, planned = options.profile, options.plan(engine)
+        profile, planned = options.profile, options.plan()
         out.mkdir(parents=True, exist_ok=True)
         names = simulate_grasps(
             planned, out, engine=engine, force=force, notify=print_message, steps=progress
         )
-        if film is not None:
-            print_message(f"rendering {planned[0].name}: about a minute")
-            with whole_file(film, force=force) as part:
-                render.film(planned[0], part)
         if video:
             film_all(planned, out, fps, engine=engine, force=force, steps=progress)
         n_failed = sum("-failed" in name for name in names)

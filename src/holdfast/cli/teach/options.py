@@ -25,7 +25,7 @@ WITHOUT_CAMERA = (
     "Without --camera no slip is measured: this ends with a calibration, and the\n"
     "slips stay those that the model finds on a hand it was not trained on."
 )
-"""What the figures will rest on."""
+"""Evidence on which the figures rest."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class GuideOptions:
             MissingExtra: a camera needs a package that is not installed.
         """
         if bool(source) == (data is not None):
-            given = f"{source} and --from {data}" if source else "neither"
-            raise ValueError(f"a SOURCE, or recordings with --from, expected; {given} given")
+            inputs = f"{source} and --from {data}" if source else "neither"
+            raise ValueError(f"a SOURCE, or recordings with --from, expected; {inputs} given")
         if data is not None:
             if self != WITHOUT_PROTOCOL:
                 raise ValueError("--camera, --to, --resume and --unattended need a SOURCE")

@@ -1,4 +1,4 @@
-"""What the guided protocol of `holdfast teach` shows in a terminal, and its keys."""
+"""Screen of the guided protocol of `holdfast teach` in a terminal, and its keys."""
 
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ TEACH_KEYS = {
     "s": "skip",
     **{digit: f"throw away {digit}" for digit in "123456789"},
 }
-"""What each key does; `q` quits."""
+"""Action of each key; `q` quits."""
 TEACH_KEY_HELP = "Enter goes on   r repeats   s skips the step   1-9 throw a slide away   q quits"
 ACTIVE_KEY_HELP = "Enter goes on before the time   r begins again   s skips the step   q quits"
 SCREEN_WIDTH = 80
@@ -28,7 +28,7 @@ SAFETY = (
     "  2  The object can fall on something soft.",
     "  3  You can stop the robot.",
 )
-"""What a person confirms before the protocol begins."""
+"""Conditions that a person confirms before the protocol begins."""
 
 
 def screen_lines(view: "View", progress: str) -> list[str]:

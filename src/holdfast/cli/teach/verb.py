@@ -6,9 +6,10 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.options import (
+    DEFAULT_JOBS,
     RARE,
-    EngineOptions,
     ForceOption,
+    JobsOption,
     JsonOption,
     ModelOutput,
     SeedOption,
@@ -53,7 +54,7 @@ def teach(
         ),
     ] = 1.5,
     speed: Annotated[SpeedOption, RARE] = 1.0,
-    parallel: EngineOptions,
+    jobs: JobsOption = DEFAULT_JOBS,
     seed: Annotated[SeedOption, RARE] = 0,
     force: ForceOption = False,
     start: StartOptions,
@@ -81,15 +82,16 @@ def teach(
     from holdfast.cli.teach.report import NO_SLIPS, print_taught
     from holdfast.detection import Model
     from holdfast.files import refuse_overwrite
+    from holdfast.parallel import Engine
     from holdfast.training.teaching import teach_with_report
 
     guide.check(source, data, speed)
     refuse_overwrite(out, force=force)
-    given, engine = Model.load(model), parallel.start()
-    base, steps, path = given, [], data
+    base_model = Model.load(model)
+    base, steps, path = base_model, [], data
     if path is None:
-        folder = guide.run(source, given, out, speed)
-        base, is_calibrated = calibrated(given, folder)
+        folder = guide.run(source, base_model, out, speed)
+        base, is_calibrated = calibrated(base_model, folder)
         steps, path = folder.results, folder.path
         if not any(result.n_slides for result in folder.kept):
             if not is_calibrated:
@@ -100,9 +102,14 @@ def teach(
             else:
                 print_paragraph(f"{out}: {NO_SLIPS}")
             return
-    recordings = start.load_dataset(engine.path(path))
+    recordings = start.load_dataset(path)
     taught = teach_with_report(
-        base, recordings, false_alarms=false_alarms, seed=seed, engine=engine, progress=progress
+        base,
+        recordings,
+        false_alarms=false_alarms,
+        seed=seed,
+        engine=Engine(jobs),
+        progress=progress,
     )
     taught.model.save(out, force=force)
     report_too_few_taxels(taught.model, recordings)
@@ -111,6 +118,6 @@ def teach(
     if as_json:
         print_json({**taught.document(out), "steps": steps})
         return
-    print_taught(taught, given.name or model)
+    print_taught(taught, base_model.name or model)
     print_line()
     print_line(f"{out}: taught by {taught.n_recordings} recordings")

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from datetime import timedelta
 from threading import Lock, Timer
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from holdfast.cli.terminal.console import print_message, visible
@@ -58,8 +57,8 @@ def progress(
         total: sum of the costs of all items; by default the length of `items`, if it has one.
         cost: function that returns the cost of an item, in any unit.
     """
-    known = total if total is not None else getattr(items, "__len__", lambda: None)()
-    with ProgressBar(what, known) as bar:
+    length = total if total is not None else getattr(items, "__len__", lambda: None)()
+    with ProgressBar(what, length) as bar:
         for item in items:
             yield item
             bar.advance(cost(item))
@@ -186,12 +185,7 @@ class LiveDisplay:
             self._live.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._live:
             self._live.stop()
 

@@ -103,7 +103,7 @@ class Assembler:
     @property
     def sensors(self) -> dict[str, Sensor]:
         """Sensors by module."""
-        return {n: one for device in self.devices.values() for n, one in device.modules.items()}
+        return {n: skin for device in self.devices.values() for n, skin in device.modules.items()}
 
     @property
     def metadata(self) -> dict[str, Any]:
@@ -171,8 +171,8 @@ class Assembler:
         if received - self._noticed_at.get(topic, -math.inf) < NOTICE_REPEAT_INTERVAL:
             return
         recent = {
-            one: at
-            for one, at in self._noticed_at.items()
+            text_noticed: at
+            for text_noticed, at in self._noticed_at.items()
             if received - at < NOTICE_REPEAT_INTERVAL
         }
         self._noticed_at = recent | {topic: received}
@@ -223,8 +223,8 @@ class Assembler:
         for time, (samples, faults) in sorted(self._instants.items()):
             # Equal or older than another device's: just after it, as times must increase.
             self._time = max(time, math.nextafter(self._time, math.inf))
-            known = {name: these for name, these in faults.items() if these}
-            arrivals.append(Arrival(self._time, samples, received, known))
+            faults_of_module = {name: these for name, these in faults.items() if these}
+            arrivals.append(Arrival(self._time, samples, received, faults_of_module))
         # A flood of refused packets would be a flood of arrivals without samples.
         refused = self.n_refused and not self._hold_refusals
         if not arrivals and (self._notices or self._faults or refused):
@@ -251,7 +251,7 @@ class _Instant(NamedTuple):
 
 
 class _PacketTime(NamedTuple):
-    """Times of a packet: its own stamp, that on the source's clock, and that of its arrival."""
+    """Times of a packet: its stamp, the same moment on the source's clock, and its arrival."""
 
     time: float
     stamp: Stamp

@@ -145,7 +145,7 @@ class Player(Source):
         self._next: TimedSamples | None = None  # the item that `_peek` has read
         self._continues = False
         self._number = 0
-        # From the times of the recording to those of the source, which go on from one recording to
+        # From times of the recording to times of the source, which go on from one recording to
         # the next; and the time of the last samples of the source.
         self._shift = 0.0
         self._last = math.nan
@@ -321,6 +321,6 @@ class ReplaySource(Player):
 
     def metadata_of(self, first: Recording) -> dict[str, object]:
         """Return the metadata of the recording, with this source and the original one."""
-        own = dict(first.metadata)
-        recorded_from = {"recorded_from": own["source"]} if "source" in own else {}
-        return own | recorded_from | {"source": self.name}
+        metadata = dict(first.metadata)
+        recorded_from = {"recorded_from": metadata["source"]} if "source" in metadata else {}
+        return metadata | recorded_from | {"source": self.name}

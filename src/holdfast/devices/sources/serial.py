@@ -36,7 +36,7 @@ BOARD = 1
 class PortSource(DeviceSource):
     """Source of a device at a serial port, which has no clock.
 
-    The time of a sample follows from that of its arrival, on the host's monotonic clock (see
+    The time of a sample follows from its arrival, on the host's monotonic clock (see
     `ArrivalClock`). A subclass has the decoder of the bytes.
 
     Attributes:
@@ -239,13 +239,13 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
             f"{address.text}: mags={n_mags} given; {kind.name} has {kind.n_taxels} taxels, "
             f"a multiple of that expected"
         )
-    given = address.names()
-    if unknown := sorted(set(given) - set(range(1, n_modules + 1))):
+    stated = address.names()
+    if unknown := sorted(set(stated) - set(range(1, n_modules + 1))):
         raise ValueError(
             f"{address.text}: a name for finger {unknown[0]} given; with {n_mags} magnetometers "
             f"of {kind.name} there are {n_modules}"
         )
-    names = tuple(given.get(k, f"finger{k}") for k in range(1, n_modules + 1))
+    names = tuple(stated.get(k, f"finger{k}") for k in range(1, n_modules + 1))
     if repeated := sorted({name for name in names if names.count(name) > 1}):
         raise ValueError(f"{address.text}: two fingers would be called {repeated[0]}")
     return names
@@ -253,8 +253,8 @@ def _modules(address: Address, n_mags: int, kind: Sensor) -> tuple[str, ...]:
 
 def _reason(cause: Exception) -> str:
     """Return the reason why a port failed, in a few words if it is a common one."""
-    known = {
+    reasons = {
         ENOENT: "there is no such port",
         EACCES: "it may not be opened; is the user in the group dialout?",
     }
-    return known.get(getattr(cause, "errno", None) or 0, str(cause))
+    return reasons.get(getattr(cause, "errno", None) or 0, str(cause))

@@ -211,15 +211,15 @@ def grasp_of(address: Address) -> Grasp:
     address.only("object", "seed", "case", "repeat", "profile", "server", "sensor")
     if address.host or address.path:
         raise ValueError(f"{address.text}: twin:?object=can&seed=1 expected, without a path")
-    given = address.parameters
+    parameters = address.parameters
     grasp = Grasp(
-        given.get("object", "can"),
+        parameters.get("object", "can"),
         address.integer("case", 2),
         address.integer("repeat", 1),
-        given.get("profile", "reference"),
+        parameters.get("profile", "reference"),
         address.integer("seed", 0),
         server=address.choice("server", "false", "true") == "true",
-        sensor=given.get("sensor", USKIN),
+        sensor=parameters.get("sensor", USKIN),
     )
     try:
         profile(grasp.profile)

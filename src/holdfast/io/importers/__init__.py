@@ -79,8 +79,8 @@ def import_recordings(
         ValueError: there is no format of this name, `columns` is not valid, or `sensors` or
             `columns` are given for a format that does not take them.
     """
-    path, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
-    name = _format_of(path, format, sensors, given)
+    path, layout = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
+    name = _format_of(path, format, sensors, layout)
     with recording_errors(path):
         source = importer(name)
         if extra := extra_of(name):
@@ -95,16 +95,18 @@ def import_recordings(
                 if not part.is_dir():
                     check_regular(part)
                 reader = read_foreign(
-                    part, name, sensors, given, report, limited=limited, accept=accept
+                    part, name, sensors, layout, report, limited=limited, accept=accept
                 )
-                for found in reader:
-                    recording = replace(found, name=f"{prefix}{found.name}") if prefix else found
+                for read in reader:
+                    recording = replace(read, name=f"{prefix}{read.name}") if prefix else read
                     if labels:
                         yield recording
                         continue
                     modules = {key: replace(m, labels=()) for key, m in recording.modules.items()}
                     # The label of a whole recording is a field of its metadata.
-                    facts = {key: one for key, one in recording.metadata.items() if key != SLIPPED}
+                    facts = {
+                        key: value for key, value in recording.metadata.items() if key != SLIPPED
+                    }
                     yield replace(recording, modules=modules, metadata=facts)
 
     return recordings()
@@ -132,11 +134,11 @@ def import_parts(
         RecordingError: `path` does not exist, no format fits, or the folder has no such file.
         ValueError: as `import_recordings`.
     """
-    path, given = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
-    name = _format_of(path, format, sensors, given)
+    path, layout = Path(path), Columns.parse(columns) if isinstance(columns, str) else columns
+    name = _format_of(path, format, sensors, layout)
     with recording_errors(path):
         source = importer(name)
-        more = (given, sensors) if name == "csv" else ()
+        more = (layout, sensors) if name == "csv" else ()
         parts: list[Path] = source.parts(path, *more)
     return name, parts
 
@@ -197,9 +199,9 @@ def _format_of(
             return "csv"
         loaded = {plugin: IMPORTER_PLUGINS.load(plugin) for plugin in IMPORTER_PLUGINS.names()}
         loaded["arrays"] = importer("arrays")
-        for known, source in loaded.items():
-            if source is not None and takes_sensors(known) and source.can_read(path):
-                return known
+        for other, source in loaded.items():
+            if source is not None and takes_sensors(other) and source.can_read(path):
+                return other
         return "csv"
 
 
@@ -228,7 +230,7 @@ def takes_sensors(name: str) -> bool:
 
 
 def import_hint(name: str) -> str | None:
-    """Return the text of `HINTS` for a format, or that of its plug-in; None without one."""
+    """Return the hint of a format, from `HINTS` or from its plug-in; None without one."""
     hint: str | None = HINTS.get(name) or getattr(importer(name), "HINT", None)
     return hint
 

@@ -81,7 +81,9 @@ def _files(path: Path) -> list[Path]:
     if path.is_file():
         return [path]
     files = path.glob("*") if not csv_files(path) else ()
-    return sorted((one for one in files if one.is_file() and _has_arrays(one)), key=natural_order)
+    return sorted(
+        (file for file in files if file.is_file() and _has_arrays(file)), key=natural_order
+    )
 
 
 def _has_arrays(file: Path) -> bool:
@@ -117,7 +119,7 @@ def arrays_of_matlab(path: Path) -> StoredArrays:
     from scipy.io import loadmat
 
     content = loadmat(path, simplify_cells=True)
-    return _flat({name: one for name, one in content.items() if not name.startswith("__")})
+    return _flat({name: values for name, values in content.items() if not name.startswith("__")})
 
 
 def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, StoredArray]:
@@ -134,23 +136,23 @@ def arrays_of_hdf5(path: Path, *, is_transposed: bool = False) -> dict[str, Stor
     import h5py
 
     file = h5py.File(path, "r")  # open until the process has read what it needs
-    found: dict[str, StoredArray] = {}
+    arrays: dict[str, StoredArray] = {}
     waiting: list[tuple[str, Any]] = [("", file["/"])]
     while waiting:
         name, group = waiting.pop()
         for key, value in group.attrs.items():
             if np.ndim(value) == 0 and np.asarray(value).dtype.kind in "iuf":
-                found[f"{name}/{key}"] = in_memory(np.asarray(value))
+                arrays[f"{name}/{key}"] = in_memory(np.asarray(value))
         if isinstance(group, h5py.Dataset):
-            found |= _of_dataset(path, name, group, is_transposed=is_transposed)
+            arrays |= _of_dataset(path, name, group, is_transposed=is_transposed)
             continue
         for key in group:
             inside = f"{name}/{key}".lstrip("/")
             if not isinstance(group.get(key, getlink=True), h5py.HardLink):
-                found[inside] = _refused(f"{path}: {inside} {_NOT_STORED}")
+                arrays[inside] = _refused(f"{path}: {inside} {_NOT_STORED}")
             elif not key.startswith("#"):  # what MATLAB refers to
                 waiting.append((inside, group[key]))
-    return found
+    return arrays
 
 
 def _refused(text: str) -> StoredArray:
@@ -169,7 +171,7 @@ def _of_dataset(
     *,
     is_transposed: bool,
 ) -> dict[str, StoredArray]:
-    """Return the array of a dataset, or those of its fields; none of other values."""
+    """Return the arrays of a dataset: one, or one for each field; none if it holds no numbers."""
     import h5py
 
     shape = tuple(reversed(dataset.shape or ())) if is_transposed else dataset.shape
@@ -227,7 +229,7 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
         for name in names
         if is_number(schema.field(name).type) or pa.types.is_string(schema.field(name).type)
     ]
-    found: dict[str, StoredArray] = {}
+    arrays: dict[str, StoredArray] = {}
     table = file.read(columns=wanted, use_threads=False)
     for name in wanted:
         column = table[name].combine_chunks()
@@ -241,8 +243,8 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
         else:
             values = column.to_numpy(zero_copy_only=False)
             values = values.astype(str) if values.dtype.kind == "O" else values
-            found[name] = in_memory(values.reshape(lengths))
-    return found
+            arrays[name] = in_memory(values.reshape(lengths))
+    return arrays
 
 
 def arrays_of_json(path: Path) -> StoredArrays:
@@ -262,7 +264,7 @@ def arrays_of_json(path: Path) -> StoredArrays:
                     raise RecordingError(f"{path}: record {number} is damaged: {cause}") from cause
         return arrays_of_records(records)
     if isinstance(document, list):
-        return arrays_of_records(one for one in document if isinstance(one, dict))
+        return arrays_of_records(record for record in document if isinstance(record, dict))
     return _flat(document)
 
 
@@ -281,17 +283,17 @@ def refuse_pickle(path: Path) -> StoredArrays:
 def _flat(content: Any, path: str = "") -> dict[str, StoredArray]:  # noqa: ANN401 (any content)
     """Return the arrays in records and lists, by path."""
     if isinstance(content, Mapping):
-        pairs = [(str(key), one) for key, one in content.items()]
+        pairs = [(str(key), item) for key, item in content.items()]
     else:
         with suppress(ValueError):  # values of several shapes, or records
             values = np.asarray(content)
             if values.dtype.kind in "biufUM":
                 return {path: in_memory(values)}
-        pairs = [(str(k), one) for k, one in enumerate(content)] if np.ndim(content) else []
+        pairs = [(str(k), item) for k, item in enumerate(content)] if np.ndim(content) else []
     return {
         name: array
-        for key, one in pairs
-        for name, array in _flat(one, f"{path}/{key}" if path else key).items()
+        for key, item in pairs
+        for name, array in _flat(item, f"{path}/{key}" if path else key).items()
     }
 
 

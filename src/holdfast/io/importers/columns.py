@@ -1,6 +1,6 @@
 """The layout of numbers in a file: time, unit, recordings, fingers, taxels and axes.
 
-It is the same for tables, arrays and bags. Its text is that of `--columns`, such as
+It is the same for tables, arrays and bags. It is written as in `--columns`, such as
 `time=stamp:ms,taxels=2..16`; `--axes` and `--unit` stand beside it.
 """
 

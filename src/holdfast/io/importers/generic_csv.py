@@ -56,7 +56,7 @@ def parts(
         raise RecordingError(f"no CSV file in {path}; files NAME.csv expected")
     if path.is_file() or columns:
         return files
-    n_taxels = {one.n_taxels for one in (sensors or {}).values()}
+    n_taxels = {skin.n_taxels for skin in (sensors or {}).values()}
     return [file for file in files if _names_taxels(file, n_taxels)] or files
 
 

@@ -1,6 +1,6 @@
-"""What readings say of their layout: signs, units, sentinels and axes that cannot be true.
+"""Find wrong layouts of readings: signs, units, sentinels and axes that cannot be true.
 
-`import`, `info` and `doctor` use it. Faults of single samples are those of the kernel.
+`import`, `info` and `doctor` use it. The kernel finds faults of single samples.
 """
 
 from collections.abc import Iterator
@@ -185,7 +185,7 @@ def _quantities(values: Array, skin: Sensor, unit: str) -> Iterator[LayoutFindin
 
 
 def _turned(normal: Array) -> Iterator[LayoutFinding]:
-    """Yield the finding that z of some taxels falls where that of others rises."""
+    """Yield the finding that z falls at some taxels while it rises at others."""
     n_rest = max(len(normal) // 20, 2)
     change = normal - np.median(normal[:n_rest], axis=0)
     size = np.abs(change).mean(axis=1)

@@ -13,15 +13,15 @@ from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number
 MAX_NAME = 200
 """Maximum length of a name that can say finger, taxel and axis [characters]."""
 MODULE_OF_ROWS = re.compile(r"(?:(?:sensor|module|finger)(?:[_ ]?id)?|id|name)", re.IGNORECASE)
-"""Names of a column that says of which module a row is."""
+"""Names of a column with the module of each row."""
 EPISODE_OF_ROWS = re.compile(r"(?:episode|trial)(?:[_ ]?(?:id|index))?", re.IGNORECASE)
-"""Names of a column that says of which recording a row is."""
+"""Names of a column with the recording of each row."""
 FINGER = re.compile(
     r"[\W_]*(?:thumb|index|middle|ring|little|pink(?:y|ie)|left|right|palm|finger(?:tip)?|tip|pad|"
     r"skin|sensor|module|board|hand|[lr]f?|[fmlr]f|th)?[\W_]*\d*[\W_]*",
     re.IGNORECASE,
 )
-"""What names of fingers say; other words that differ may be other quantities."""
+"""Words of names that mean fingers; other words that differ may mean other quantities."""
 OTHER_QUANTITIES = {
     "accelerometer": ("acc", "accel", "accelerometer", "acceleration", "imu"),
     "gyroscope": ("gyr", "gyro", "gyroscope", "angular"),
@@ -58,7 +58,7 @@ Cells = Mapping[tuple[int, str], str]
 
 
 class Group(NamedTuple):
-    """What columns of one module have in common: their names without taxel and axis."""
+    """Common part of the columns of a module: their names without taxel and axis."""
 
     form: int
     head: str
@@ -112,7 +112,7 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
     Raises:
         RecordingError: a group lacks a column.
     """
-    found: dict[Group, dict[tuple[int, str], str]] = {}
+    cells_of_group: dict[Group, dict[tuple[int, str], str]] = {}
     doubled: dict[Group, tuple[str, str]] = {}
     for name in names:
         if len(name) > MAX_NAME:
@@ -123,11 +123,13 @@ def named_groups(names: Sequence[str], n_taxels: Collection[int]) -> dict[Group,
                 parts = match.groupdict()
                 taxel = int(parts.get("taxel", FIRST_TAXEL))
                 group = Group(form, parts["head"], parts.get("mid", ""), parts["tail"], unit)
-                other = found.setdefault(group, {}).setdefault((taxel, parts["axis"].lower()), name)
+                other = cells_of_group.setdefault(group, {}).setdefault(
+                    (taxel, parts["axis"].lower()), name
+                )
                 if other != name:
                     doubled[group] = other, name
     groups: dict[Group, Cells] = {}
-    for group, cells in found.items():
+    for group, cells in cells_of_group.items():
         numbers = sorted({taxel for taxel, _ in cells})
         whole = [(taxel, axis) for taxel in numbers for axis in "xyz"]
         is_run = numbers[-1] - numbers[0] == len(numbers) - 1
@@ -155,8 +157,8 @@ def module_names(groups: Sequence[Group]) -> list[str]:
         ['B0', 'B1']
     """
     if len(groups) == 1:
-        own = re.fullmatch(r"(.+)[._]t", groups[0].head)  # of holdfast's own CSV
-        return [own[1] if own else ""]
+        match = re.fullmatch(r"(.+)[._]t", groups[0].head)  # of holdfast's own CSV
+        return [match[1] if match else ""]
     return different_parts([f"{group.head} {group.mid}" for group in groups])
 
 

@@ -115,18 +115,18 @@ class _Reader:
     def recordings(self) -> list[Recording]:
         """Return the recordings by the layout as it is known."""
         self._raw, self.notes = [], []
-        found: dict[str, dict[str, Tactile]] = {}
+        by_end: dict[str, dict[str, Tactile]] = {}
         for track in self._tracks:
             for end, name, module in self._modules(track):
-                if name in found.setdefault(end, {}):
+                if name in by_end.setdefault(end, {}):
                     raise RecordingError(f"two modules {name!r} given; each needs its own name")
-                found[end][name] = module
+                by_end[end][name] = module
         path = self.layout.source.path
-        for modules in found.values():
+        for modules in by_end.values():
             _check_overlap(modules)
         return [
             Recording(f"{path.stem}{end}", modules, {"source": path.name})
-            for end, modules in found.items()
+            for end, modules in by_end.items()
         ]
 
     def _modules(self, track: Track) -> Iterator[tuple[str, str, Tactile]]:
@@ -149,9 +149,9 @@ class _Reader:
                 rows = np.intersect1d(of_episode, of_module)
                 rows = rows[self._in_order(times[rows])]
                 for k, name in enumerate(track.modules):
-                    module, own = row_module or name or DEFAULT_MODULE, readings[rows, k]
-                    self._raw.append((module, track, own))
-                    part = mended(own.copy(), self._columns.missing, self._columns.wrap)
+                    module, raw = row_module or name or DEFAULT_MODULE, readings[rows, k]
+                    self._raw.append((module, track, raw))
+                    part = mended(raw.copy(), self._columns.missing, self._columns.wrap)
                     is_sample = np.isfinite(part).any(axis=(1, 2))
                     # A sample without a reading is none, if a number stands for it.
                     is_sample |= self._columns.missing is None
@@ -183,11 +183,11 @@ class _Reader:
     def _unit(self, track: Track) -> tuple[float, str]:
         """Return the factor to the unit that is kept, and that unit."""
         stated = self.layout.source.stated
-        own = stated.get(("unit", track.modules[0])) or stated.get(("unit", None))
-        if own not in (None, "count", "N"):
-            raise RecordingError(f"unit 'count' or 'N' expected, {own!r} given")
-        is_given = bool(self._columns.unit or own)
-        unit = self._columns.unit or own or track.unit or track.skin.unit
+        stated_unit = stated.get(("unit", track.modules[0])) or stated.get(("unit", None))
+        if stated_unit not in (None, "count", "N"):
+            raise RecordingError(f"unit 'count' or 'N' expected, {stated_unit!r} given")
+        is_given = bool(self._columns.unit or stated_unit)
+        unit = self._columns.unit or stated_unit or track.unit or track.skin.unit
         if is_given or track.unit:
             why = "as given" if is_given else "by the names"
             self.layout.choose("unit", unit, why, is_said=True)
@@ -209,10 +209,10 @@ class _Reader:
 
     def _rows_by(self, kind: str, track: Track) -> dict[str, Rows]:
         """Return the rows of each module or recording by a column; none without one."""
-        given = getattr(self._columns, kind)
+        column = getattr(self._columns, kind)
         pattern = MODULE_OF_ROWS if kind == "module" else EPISODE_OF_ROWS
         free = (n for n in track.beside if n not in track.used and pattern.fullmatch(n.strip()))
-        name = self._column(track, given) if given else next(free, None)
+        name = self._column(track, column) if column else next(free, None)
         if name is None:
             return {}
         cells = _texts(track.beside[name])
@@ -222,7 +222,7 @@ class _Reader:
         is_run = (
             n_changes == len(kinds) - 1 > 0 and min(Counter(cells).values()) >= of_times.MIN_EPISODE
         )
-        if not given and not (takes_turns if kind == "module" else is_run):
+        if not column and not (takes_turns if kind == "module" else is_run):
             return {}
         self.layout.used.add(name)
         is_numbered = kind == "module" and all(
@@ -246,7 +246,7 @@ class _Reader:
         return {str(k): rows[a:b] for k, (a, b) in parts} if starts else {"": rows}
 
     def _times(self, track: Track, first: Rows, n: int) -> Array:
-        """Return the times of all rows [s], by those of the first module."""
+        """Return the times of all rows [s]; the first module has them."""
         name = self._time_name(track, first)
         if name is None:
             return np.arange(n) / (self._columns.rate or 1.0)
@@ -260,10 +260,10 @@ class _Reader:
         values = values.astype(np.float64)
         if self.layout.source.stated and self._columns.time is None:  # holdfast's own CSV
             return values
-        found = of_times.times_of(name, values[first], self._columns.time_unit, track.skin.rate)
-        if found.reason:
-            self._set_time(f"{name}:{found.unit}", found.reason, time=name, time_unit=found.unit)
-        times: Array = values * of_times.TIME_UNITS[found.unit]
+        stamps = of_times.times_of(name, values[first], self._columns.time_unit, track.skin.rate)
+        if stamps.reason:
+            self._set_time(f"{name}:{stamps.unit}", stamps.reason, time=name, time_unit=stamps.unit)
+        times: Array = values * of_times.TIME_UNITS[stamps.unit]
         problem = (
             "" if of_times.restarts(times[first]) else of_times.check_steps(name, times[first])
         )
@@ -336,19 +336,19 @@ class _Reader:
         """Return the labels of a module by the columns `label` and `cause`."""
         cells = {"cause": [""] * len(rows)}
         for kind in ("label", "cause"):
-            given = getattr(self._columns, kind)
-            names = [self._column(track, given)] if given else [f"{module}.{kind}", kind]
+            column = getattr(self._columns, kind)
+            names = [self._column(track, column)] if column else [f"{module}.{kind}", kind]
             if name := next((name for name in names if name in track.beside), None):
                 texts = _texts(track.beside[name])
                 cells[kind] = [texts[row].strip() for row in rows]
                 self.layout.used.add(name)
         # A label says UNKNOWN by having no state.
-        known = [s.value.lower() for s in ContactState if s is not ContactState.UNKNOWN]
+        states = [s.value.lower() for s in ContactState if s is not ContactState.UNKNOWN]
         pairs: list[tuple[ContactState, Cause | None] | None] = []
         for row, state, cause in zip(
             rows.tolist(), cells.get("label", ()), cells["cause"], strict=False
         ):
-            for what, word, words in (("label", state, known), ("cause", cause, [*Cause])):
+            for what, word, words in (("label", state, states), ("cause", cause, [*Cause])):
                 if state and word and word.lower() not in words:
                     raise RecordingError(
                         f"sample {row + 1}: {what} {word!r} given; {', '.join(words)} are known"
@@ -402,7 +402,7 @@ class _Reader:
         """Return a line about what was read."""
         modules = recordings[0].modules
         rate = next(iter(modules.values())).rate
-        names = ", ".join(f"{name} {one.sensor.n_taxels} taxels" for name, one in modules.items())
+        names = ", ".join(f"{name} {x.sensor.n_taxels} taxels" for name, x in modules.items())
         said = {choice.what: choice for choice in self.layout.choices}
         time, unit = said.get("time"), said.get("unit")
         by = f" by {time.value}" if time and time.value != f"{rate:g}Hz" else ""

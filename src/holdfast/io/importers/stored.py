@@ -56,20 +56,20 @@ def arrays_of_records(records: Iterable[Mapping[str, Any]]) -> dict[str, StoredA
     for record in records:
         leaves = dict(_leaves(record, ""))
         kinds = tuple(leaves.get(name) for name in KIND_NAMES)
-        shapes = ((name, np.shape(one)) for name, one in leaves.items() if np.ndim(one))
+        shapes = ((name, np.shape(x)) for name, x in leaves.items() if np.ndim(x))
         groups.setdefault((*kinds, *sorted(shapes)), []).append(leaves)
     with_arrays = [key for key in groups if len(key) > len(KIND_NAMES)] or list(groups)
-    found: dict[str, StoredArray] = {}
+    arrays: dict[str, StoredArray] = {}
     for k, key in enumerate(sorted(with_arrays, key=lambda key: -len(groups[key]))):
         rows = groups[key]
         words = [word for word in key[: len(KIND_NAMES)] if isinstance(word, str)]
         prefix = "" if len(with_arrays) == 1 else f"{'/'.join(words) or f'part{k + 1}'}/"
         for name in rows[0]:
             values = [row[name] for row in rows if name in row]
-            is_alike = len({(np.shape(one), isinstance(one, str)) for one in values}) == 1
+            is_alike = len({(np.shape(x), isinstance(x, str)) for x in values}) == 1
             if len(values) == len(rows) and is_alike:
-                found.setdefault(prefix + name, in_memory(np.array(values)))
-    return found
+                arrays.setdefault(prefix + name, in_memory(np.array(values)))
+    return arrays
 
 
 def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 (any JSON value)
@@ -78,13 +78,13 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
         yield path, np.array([value[axis] for axis in "xyz"], dtype=np.float64)
     elif isinstance(value, Mapping):
         sizes = np.ravel(value["shape"]) if np.ndim(value.get("shape", 0)) == 1 else ()
-        for key, one in value.items():
-            is_shaped = len(sizes) and np.ndim(one) == 1 and np.size(one) == np.prod(sizes)
-            part = np.reshape(one, [int(n) for n in sizes]) if is_shaped and key != "shape" else one
+        for key, x in value.items():
+            is_shaped = len(sizes) and np.ndim(x) == 1 and np.size(x) == np.prod(sizes)
+            part = np.reshape(x, [int(n) for n in sizes]) if is_shaped and key != "shape" else x
             if key != "shape" or not len(sizes):
                 yield from _leaves(part, f"{path}/{key}" if path else str(key))
-    elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
-        rows = [dict(_leaves(one, "")) for one in value]
+    elif isinstance(value, list) and value and all(isinstance(x, Mapping) for x in value):
+        rows = [dict(_leaves(x, "")) for x in value]
         ids = [[row.get(name) for row in rows] for name in ID_NAMES]
         with suppress(TypeError):  # an id that is no number
             for numbers in ids:
@@ -107,17 +107,17 @@ def _leaves(value: Any, path: str) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
 
 
 def joined_axes(columns: Mapping[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays with those of x, y and z of one name as one array, the axis last.
+    """Return the arrays; x, y and z of one name are joined to one array, the axis last.
 
     Example:
         >>> joined_axes({axis: np.zeros(4) for axis in ("fx", "fy", "fz")})["f"].shape
         (4, 3)
     """
-    found = dict(columns)
+    joined_columns = dict(columns)
     for name in columns:
         triple = [re.sub(r"x(?=$|[\W_])", axis, name) for axis in "xyz"]
-        if len(set(triple)) == 3 and all(one in found for one in triple):
+        if len(set(triple)) == 3 and all(x in joined_columns for x in triple):
             joined = re.sub(r"[\W_]?x(?=$|[\W_])", "", name) or "xyz"
-            if joined not in found:
-                found[joined] = np.stack([found.pop(one) for one in triple], axis=-1)
-    return found
+            if joined not in joined_columns:
+                joined_columns[joined] = np.stack([joined_columns.pop(x) for x in triple], axis=-1)
+    return joined_columns

@@ -31,7 +31,7 @@ MIN_CELLS = 4
 MAX_BLOCK = 100
 """Maximum number of lines before such a header."""
 SEPARATORS = ",;\t| "
-"""Characters between the cells of a row, of which a file has one; any number of blanks is one."""
+"""Possible separators of cells; a file uses one of them. Several blanks count as one."""
 SLIPPED = "slipped"
 """Field of the metadata with the label of a whole recording: whether the object slipped."""
 
@@ -49,7 +49,7 @@ _OTHER_FORMS = re.compile(r"[^\x00-\x7f]|[_\r\n]")
 
 
 class TableHead(NamedTuple):
-    """What is before the first row of a file.
+    """Head of a file: all lines before its first row.
 
     Attributes:
         comments: lines that begin with `#`, without the `#`.
@@ -338,7 +338,7 @@ class CsvFormat(NamedTuple):
     """Format of CSV files that are recognised by their header.
 
     Attributes:
-        is_header: whether the names of the columns are those of the format.
+        is_header: whether the columns have the names of the format.
         expected: message about a folder without such a file, with `{}` for its path.
         every_file: whether all CSV files of a folder are read, also those with another header.
     """
@@ -404,8 +404,10 @@ def read_head(path: Path) -> TableHead:
             for number, line in enumerate(_first_lines(file), start=1):
                 if line.startswith("#"):
                     comments.append(line[1:].strip())
-                elif number == 1 and (given := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))):
-                    separators = given["separator"]
+                elif number == 1 and (
+                    separator_line := _SEPARATOR_LINE.fullmatch(line.strip("\r\n"))
+                ):
+                    separators = separator_line["separator"]
                 elif line.strip():
                     lines = [line, file.readline(MAX_HEAD_SIZE)]
                     names, separator, n = _header(lines, file, separators)
@@ -521,14 +523,14 @@ def _names(header: str, following: str, separators: str) -> tuple[tuple[str, ...
     It is the first that gives several names, and as many cells in the following line; else the
     first that gives several.
     """
-    found: tuple[tuple[str, ...], str] | None = None
+    several: tuple[tuple[str, ...], str] | None = None
     for separator in separators:
         names = _cells(header, separator)
         if len(names) > 1:
-            found = found or (names, separator)
+            several = several or (names, separator)
             if len(_cells(following, separator)) == len(names):
                 return names, separator
-    return found or ((header.strip().strip('"'),), separators[0])
+    return several or ((header.strip().strip('"'),), separators[0])
 
 
 def _cells(line: str, separator: str) -> tuple[str, ...]:

@@ -48,7 +48,7 @@ _ONE_AXIS = re.compile(
 
 
 class ForeignFile(NamedTuple):
-    """What a file has.
+    """Arrays of a file, and its statements about them.
 
     Attributes:
         path: of the file.
@@ -130,7 +130,7 @@ class Layout:
         unit = self.columns.unit or unit
         kept = next((kept for kept, units in READING_UNITS.items() if unit in units), None)
         fitting = [sensor(name) for name in built_in_sensors()]
-        fitting = [one for one in fitting if one.n_taxels == n_taxels and kept in (None, one.unit)]
+        fitting = [x for x in fitting if x.n_taxels == n_taxels and kept in (None, x.unit)]
         name, skin = f"1x{n_taxels}", fitting[0] if len(fitting) == 1 else None
         if skin is None:
             skin = flat_sensor(
@@ -167,7 +167,7 @@ def tracks_of(layout: Layout) -> list[Track]:
 def table_tracks(layout: Layout, columns: StoredArrays, beside: StoredArrays) -> list[Track]:
     """Return the modules of the columns of a table, by their names or as they are given."""
     text, names = layout.columns.taxels, list(columns)
-    words = [given for given in (layout.columns.label, layout.columns.cause) if given]
+    words = [stated for stated in (layout.columns.label, layout.columns.cause) if stated]
     if missing := [word for word in words if named_column(list(beside), word) not in beside]:
         raise RecordingError(f"column {missing[0]!r} is missing; it has {some_names(list(beside))}")
     if text is None:
@@ -177,17 +177,17 @@ def table_tracks(layout: Layout, columns: StoredArrays, beside: StoredArrays) ->
         modules = _consecutive_modules(layout, text, names)
     tracks = []
     beside = {name: array for name, array in beside.items() if not _INDEX.fullmatch(name.strip())}
-    for module, own in modules.items():
-        unit = of_names.split_unit(own[0])[1]
-        skin = _sensor_of(layout, module, len(own) // 3, unit)
-        size = len(own) // skin.n_taxels
-        if len(own) != size * skin.n_taxels or size < len("xyz"):
+    for module, titles in modules.items():
+        unit = of_names.split_unit(titles[0])[1]
+        skin = _sensor_of(layout, module, len(titles) // 3, unit)
+        size = len(titles) // skin.n_taxels
+        if len(titles) != size * skin.n_taxels or size < len("xyz"):
             raise RecordingError(
-                f"{module or 'finger1'}: {len(own) // 3} taxels in {len(own)} columns given; "
+                f"{module or 'finger1'}: {len(titles) // 3} taxels in {len(titles)} columns given; "
                 f"{skin.n_taxels} taxels x 3 axes from t01 on expected ({skin.name})"
             )
-        read = partial(_stacked, columns, own, (-1, 1, skin.n_taxels, size))
-        tracks.append(Track(skin, (module,), read, beside, tuple(own), unit))
+        read = partial(_stacked, columns, titles, (-1, 1, skin.n_taxels, size))
+        tracks.append(Track(skin, (module,), read, beside, tuple(titles), unit))
     return tracks
 
 
@@ -203,7 +203,7 @@ def _stacked(
 def _consecutive_modules(layout: Layout, text: str, names: Sequence[str]) -> dict[str, list[str]]:
     """Return consecutive columns, of several modules if they are many."""
     run = of_names.run_of(text, names)
-    size = 3 * max((one.n_taxels for one in layout.sensors.values()), default=len(run) // 3)
+    size = 3 * max((skin.n_taxels for skin in layout.sensors.values()), default=len(run) // 3)
     if layout.columns.axes is None and len(run) % 3:
         raise RecordingError(f"taxels={text}: {len(run)} columns given; 3 for each taxel expected")
     n = 1 if layout.columns.axes is not None or not size or len(run) % size else len(run) // size
@@ -215,9 +215,9 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
     """Return the columns of each module by their names.
 
     Raises:
-        RecordingError: no names are those of taxels.
+        RecordingError: no name means a taxel.
     """
-    n_taxels = {one.n_taxels for one in layout.sensors.values()}
+    n_taxels = {skin.n_taxels for skin in layout.sensors.values()}
     groups = of_names.named_groups(names, n_taxels)
     if is_other := not groups and bool(n_taxels):
         groups = of_names.named_groups(names, ())
@@ -241,26 +241,31 @@ def _named_modules(layout: Layout, names: Sequence[str]) -> dict[str, list[str]]
     modules = of_names.module_names(list(groups))
     is_own = all(re.fullmatch(r".+[._]t", group.head) for group in groups)
     columns = [[cells[cell] for cell in sorted(cells)] for cells in groups.values()]
-    found = dict(zip(modules, columns, strict=True))
+    by_module = dict(zip(modules, columns, strict=True))
     first: of_names.Group = next(iter(groups))
     if len(groups) > 1 and not is_own and not of_names.are_fingers(modules):
         first = next((group for group in groups if group.words & FORCE_WORDS), first)
-        own = found.pop(modules[list(groups).index(first)])
-        rest = first_texts([other[0] for other in found.values()])
-        layout.columns = replace(layout.columns, taxels=f"{own[0]}{RUN}{own[-1]}")
-        layout.choose("taxels", f"{own[0]}{RUN}{own[-1]}", f"by its name; {rest} would fit, too")
-        found = {"": own}
-    else:
-        own = columns[0]
+        titles = by_module.pop(modules[list(groups).index(first)])
+        rest = first_texts([other[0] for other in by_module.values()])
+        layout.columns = replace(layout.columns, taxels=f"{titles[0]}{RUN}{titles[-1]}")
         layout.choose(
-            "taxels", f"{own[0]} ... {own[-1]}", f"{len(own) // 3} by their names", is_said=True
+            "taxels", f"{titles[0]}{RUN}{titles[-1]}", f"by its name; {rest} would fit, too"
         )
-    if len(found) > 1:
-        layout.choose("fingers", ", ".join(found), "by the names", is_said=True)
+        by_module = {"": titles}
+    else:
+        titles = columns[0]
+        layout.choose(
+            "taxels",
+            f"{titles[0]} ... {titles[-1]}",
+            f"{len(titles) // 3} by their names",
+            is_said=True,
+        )
+    if len(by_module) > 1:
+        layout.choose("fingers", ", ".join(by_module), "by the names", is_said=True)
     if is_other:
-        given = " or ".join(one.name for one in layout.sensors.values())
-        layout.propose_sensor(len(own) // 3, first.unit, f" of x, y and z, not those of {given}")
-    return found
+        skins = " or ".join(skin.name for skin in layout.sensors.values())
+        layout.propose_sensor(len(titles) // 3, first.unit, f" of x, y and z, not those of {skins}")
+    return by_module
 
 
 def _no_taxels(
@@ -411,8 +416,8 @@ class _ArrayFinder:
                 fitting, names, ends, is_said = [best], [module], [""], False
         if not is_said:
             self._propose_arrays(fitting, option_key, skin)
-        found = zip(fitting, names, ends, strict=True)
-        return [track for path, name, end in found for track in self._at([path], skin, name, end)]
+        triples = zip(fitting, names, ends, strict=True)
+        return [track for path, name, end in triples for track in self._at([path], skin, name, end)]
 
     def _propose_arrays(self, paths: Sequence[str], key: str, skin: Sensor) -> None:
         """Propose arrays for the sensor of a key."""
@@ -421,7 +426,7 @@ class _ArrayFinder:
         if key == ANY_MODULE:  # the name of a sensor that was proposed, too
             key = next(name for _, path, name in layout.options if not path)
         options = [(option, f"{slash}{path}", key) for path in paths]
-        layout.options = [*options, *(one for one in layout.options if one[2] != key)]
+        layout.options = [*options, *(x for x in layout.options if x[2] != key)]
         if not any(choice.what == "array" for choice in layout.choices):
             shape = self._arrays[paths[0]].shape
             layout.choose("array", ", ".join(paths), f"{skin.n_taxels} taxels in shape {shape}")
@@ -440,14 +445,14 @@ class _ArrayFinder:
         """Return the arrays of single values beside an array: in its group, or one around it."""
         columns = self._layout.columns
         texts = (columns.time, columns.label, columns.cause, columns.module, columns.episode)
-        given = {text.strip("/") for text in texts if text}
-        found: dict[str, str] = {}  # of one name, the nearest
+        named = {text.strip("/") for text in texts if text}
+        nearest: dict[str, str] = {}  # of one name, the nearest
         for other in sorted(self._arrays, key=len):
             shape, (group, _, last) = self._arrays[other].shape, other.rpartition("/")
-            is_near = not group or f"{name}/".startswith(f"{group}/") or other in given
+            is_near = not group or f"{name}/".startswith(f"{group}/") or other in named
             if other != name and len(shape) in (1, 2) and is_near:
-                found[other if other in given else last] = other
-        return {last: self._arrays[other] for last, other in found.items()}
+                nearest[other if other in named else last] = other
+        return {last: self._arrays[other] for last, other in nearest.items()}
 
     def _quantity(self, name: str) -> str | None:
         return of_names.quantity_of(of_names.words_of("/".join(name.split("/")[-2:])))
@@ -514,13 +519,13 @@ class _ArrayFinder:
                 word: StoredArray(array.shape[:1], array.kind, partial(_part, array, np.s_[:, k]))
                 for k, word in enumerate(words)
             }
-            near = {n: one for n, one in beside.items() if prod(one.shape) == array.shape[0]}
+            near = {n: x for n, x in beside.items() if prod(x.shape) == array.shape[0]}
             if tracks := self._of_table(columns, near | columns, skin):
                 layout.used.add(path)
                 return [t._replace(modules=tuple(m or module for m in t.modules)) for t in tracks]
-        axes = [self._axes(one, skin) for one in paths]
+        axes = [self._axes(x, skin) for x in paths]
         if len(paths) > 1:
-            sizes = [self._arrays[one].shape[0] for one in paths]
+            sizes = [self._arrays[x].shape[0] for x in paths]
             axes = [_Axes(0, n, 1) if len(set(sizes)) == 1 else None for n in sizes]
         if axes[0] is None and self._group(path, skin):
             values = np.asarray(array.read(), dtype=np.float64).reshape(-1, array.shape[-1])
@@ -544,7 +549,7 @@ class _ArrayFinder:
         layout.used.update(paths)
         names = [f"finger{k + 1}" for k in range(n)] if n > 1 else [""]
         modules = tuple("/".join(filter(None, (module, name))) for name in names)
-        reads = [cache(self._arrays[one].read) for one in paths]  # once for all recordings
+        reads = [cache(self._arrays[x].read) for x in paths]  # once for all recordings
         tracks = []
         for k in range(array.shape[0] if first.is_episodes else 1):
             part = (k,) if first.is_episodes else ()
@@ -568,7 +573,7 @@ class _ArrayFinder:
             if prod(shape) == max(shape, default=0) > 1:
                 groups.setdefault(group, {})[last] = self._arrays[name]
         large = [columns for columns in groups.values() if len(columns) > len("xyz")]
-        return next(filter(None, (self._of_table(one, one, skin) for one in large)), [])
+        return next(filter(None, (self._of_table(table, table, skin) for table in large)), [])
 
     def _of_table(self, columns: StoredArrays, beside: StoredArrays, skin: Sensor) -> list[Track]:
         """Return the tracks of columns as of a table; none without names of taxels."""

@@ -5,7 +5,6 @@ import { labelAt, snap } from "./labels.js";
 const MIN_DRAG_DISTANCE = 4; // [px], a shorter movement is a click
 const EDGE_REACH = { mouse: 6, pen: 8, touch: 16 }; // [px]
 const SNAP_DISTANCE = 9; // [px]
-const MIN_PINCH_DISTANCE = 8; // [px]
 const WHEEL_UNITS = [1, 16, 400]; // [px], of wheels that count in pixels, lines or pages
 
 export class Pointer {
@@ -15,13 +14,12 @@ export class Pointer {
    */
   constructor(surface, rows, seek, hovered) {
     Object.assign(this, { surface, rows, seek, hovered, editor: rows.editor, view: rows.view });
-    this.pressed = new Map(); // x of the pressed pointers [px], by id
-    this.drag = null;
+    this.drag = null; // of one pointer; others that are pressed meanwhile do nothing
     const on = (name, act, options) => surface.addEventListener(name, act.bind(this), options);
     on("pointerdown", this.press);
     on("pointermove", this.move);
     on("pointerup", this.release);
-    on("pointercancel", this.pointerCancelled);
+    on("pointercancel", this.cancelDrag);
     on("pointerleave", this.leave);
     on("wheel", this.wheel, { passive: false });
     on("dblclick", () => this.view.showAll());
@@ -70,22 +68,13 @@ export class Pointer {
 
   press(event) {
     this.surface.focus({ preventScroll: true });
-    this.pressed.set(event.pointerId, event.clientX);
     this.surface.setPointerCapture(event.pointerId);
-    if (this.pressed.size === 2) { this.startPinch(); return; }
     const found = this.find(event);
-    if (!found || this.pressed.size > 2) return;
+    if (!found || this.drag) return;
     const pans = event.shiftKey || event.button > 0 || this.editor.readOnly;
     const mode = pans ? "pan" : found.edge ? "edge" : "label";
-    this.drag = { ...found, mode, from: found.time, fromX: event.clientX, started: false, button: event.button };
+    this.drag = { ...found, mode, from: found.time, fromX: event.clientX, lastX: event.clientX, pointer: event.pointerId, started: false, button: event.button };
     if (mode === "label") this.drag.from = this.snapped(event, found.finger, found.time);
-  }
-
-  // With two fingers on a touch screen, the times under them stay under them.
-  startPinch() {
-    this.editor.setPreview(null);
-    const times = [...this.pressed].map(([id, x]) => [id, this.view.time(this.x({ clientX: x }))]);
-    this.drag = { mode: "pinch", started: true, times };
   }
 
   /** Update what is under the pointer after the window has moved. */
@@ -98,30 +87,20 @@ export class Pointer {
     this.lastEvent = event;
     if (!found) return;
     this.rows.hoveredProposal = drag ? null : found.proposal ?? null;
-    const lastX = this.pressed.get(event.pointerId);
-    if (this.pressed.has(event.pointerId)) this.pressed.set(event.pointerId, event.clientX);
     if (!drag) { this.hover(found); return; }
+    if (event.pointerId !== drag.pointer) return;
     drag.started ||= Math.abs(event.clientX - drag.fromX) > MIN_DRAG_DISTANCE;
     if (!drag.started) return;
-    if (drag.mode === "pinch") this.pinch();
-    else if (drag.mode === "pan") this.view.pan((lastX - event.clientX) * this.view.secondsPerPixel);
+    if (drag.mode === "pan") this.view.pan((drag.lastX - event.clientX) * this.view.secondsPerPixel);
     else this.applyDrag(event, false);
+    drag.lastX = event.clientX;
     this.hover({ ...found, time: this.rows.snapTime ?? found.time });
-  }
-
-  pinch() {
-    const [[a, timeA], [b, timeB]] = this.drag.times;
-    const [xa, xb] = [a, b].map((id) => this.x({ clientX: this.pressed.get(id) }));
-    if (Math.abs(xa - xb) < MIN_PINCH_DISTANCE || timeA === timeB) return;
-    const secondsPerPixel = Math.abs((timeB - timeA) / (xb - xa));
-    const start = timeA - xa * secondsPerPixel;
-    this.view.setWindow(start, start + secondsPerPixel * this.view.width);
   }
 
   // Change labels as the drag demands, or only preview it unless `commit`.
   applyDrag(event, commit) {
     const { mode, finger, edge, from } = this.drag, { time } = this.find(event);
-    if (mode !== "edge" && mode !== "label") return;
+    if (mode === "pan") return;
     const to = this.snapped(event, finger, time, edge?.label), isForAll = event.ctrlKey || event.metaKey;
     this.rows.snapTime = commit || to === time ? null : to;
     if (mode === "edge") this.editor.moveEdge(finger, edge.label, edge.side, to, commit);
@@ -130,9 +109,7 @@ export class Pointer {
 
   release(event) {
     const { drag } = this;
-    this.pressed.delete(event.pointerId);
-    if (drag?.mode === "pinch" && this.pressed.size) return;
-    if (!drag) return;
+    if (event.pointerId !== drag?.pointer) return;
     if (drag.started) this.applyDrag(event, true);
     else if (!drag.button) this.click(drag);
     this.drag = null;
@@ -143,11 +120,6 @@ export class Pointer {
     if (this.drag) return;
     this.lastEvent = this.rows.hoveredProposal = null;
     this.hover(null);
-  }
-
-  pointerCancelled(event) {
-    this.pressed.delete(event.pointerId);
-    this.cancelDrag();
   }
 
   /** Cancel a drag without changes. Return false if there is none. */

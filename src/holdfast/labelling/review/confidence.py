@@ -39,12 +39,12 @@ def doubtful(labels: Mapping[str, Sequence[Label]], below: float = 0.8) -> list[
     """
     if not 0 <= below <= 1:
         raise ValueError(f"a confidence from 0 to 1 expected, {below} given")
-    found = [
+    unsure = [
         (finger, label)
         for finger, intervals in labels.items()
         for label in intervals
         if label.confidence < below
     ]
     return sorted(
-        found, key=lambda at: (at[1].confidence, at[1].start - at[1].end, at[1].start, at[0])
+        unsure, key=lambda at: (at[1].confidence, at[1].start - at[1].end, at[1].start, at[0])
     )

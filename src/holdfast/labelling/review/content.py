@@ -45,14 +45,14 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
         scan.add(part)
         faults.add(part)
         truth = part.truth
-    found, hidden = scan.recording, hidden_labels(path)
+    summary, hidden = scan.recording, hidden_labels(path)
     findings = [*findings_of_scan(scan), *([hidden] if hidden else [])]
     for name, module in scan.modules.items():
         n_invalid, n_samples = faults.of(name).get(Fault.INVALID, 0), module.force.n_samples
         findings += faulty_readings(name, n_invalid, n_samples, faults.stuck_taxels(name))
     findings = with_oddities(findings, scan, path)
     return {
-        "name": found.name,
+        "name": summary.name,
         "modules": {
             name: {
                 "sensor": module.sensor.name,
@@ -70,12 +70,12 @@ def content_of(path: Path, tare: Tare, recording: Recording | None = None) -> di
             }
             for name, module in scan.modules.items()
         },
-        "start": found.start,
-        "duration": found.duration,
-        "complete": found.complete,
-        "metadata": found.metadata,
-        "markers": [{"time": time, "text": text} for time, text in found.markers],
-        "media": [{"path": path, "offset": offset} for path, offset in found.media],
+        "start": summary.start,
+        "duration": summary.duration,
+        "complete": summary.complete,
+        "metadata": summary.metadata,
+        "markers": [{"time": time, "text": text} for time, text in summary.markers],
+        "media": [{"path": path, "offset": offset} for path, offset in summary.media],
         "truth": truth
         and {
             "n_samples": scan.n_truth,

@@ -51,7 +51,6 @@ FindingKind = Literal[
     "clock_drift",
     "no_labels",
     "copy",
-    "cross_talk",
     "held",
     "invalid",
     "stuck",
@@ -87,25 +86,26 @@ def findings_of(recording: Recording) -> list[Finding]:
 
 def findings_of_scan(scan: FindingsScan) -> list[Finding]:
     """Return the findings of a recording that came in parts, as `findings_of`."""
-    found = [
+    findings = [
         Finding(name, kind, text)
         for name, module in scan.modules.items()
         if module.force.n_samples > 1
         for kind, text in _of_module(module)
     ]
-    found += [
-        Finding(each.module, "copy" if each.share == 1 else "cross_talk", each.text)
-        for each in scan.alike
-    ]
+    forces = {n: m.force.readings for n, m in scan.modules.items() if not m.still.all()}
+    for (first, force), (second, other) in combinations(forces.items(), 2):
+        if np.array_equal(force, other):
+            text = f"has the same readings as {first}: one sensor is read twice, or written to "
+            findings.append(Finding(second, "copy", text + "both; check the channels"))
     if reason := evidence_of_contact(scan.recording):
         text = f"begins in contact ({reason}): the first samples are load (`holdfast detect "
         text += "--in-contact`); or z of the sensor points inwards (docs/sensors.md)"
-        return [*found, Finding("", "starts_loaded", text)]
+        return [*findings, Finding("", "starts_loaded", text)]
     with suppress(HoldfastError):  # no sample for the tare
         if not hand_force(scan.recording).n_touching.any():
             text = "no finger is in contact in the whole recording"
-            found.append(Finding("", "no_contact", text))
-    return found
+            findings.append(Finding("", "no_contact", text))
+    return findings
 
 
 def faulty_readings(
@@ -119,16 +119,16 @@ def faulty_readings(
         n_samples: number of samples.
         stuck: numbers of the taxels with the fault `stuck`, from 1.
     """
-    found = []
+    findings = []
     if n_invalid > INVALID_SHARE * n_samples:
         text = f"{n_invalid} samples ({100 * n_invalid / n_samples:.2g} %) have a reading that "
         text += "cannot be true, of one taxel, which is left out: is a magnetometer read before it "
-        found.append(Finding(name, "invalid", text + "is ready, or a byte lost?"))
+        findings.append(Finding(name, "invalid", text + "is ready, or a byte lost?"))
     if stuck:
         taxels = f"taxel{'s' if len(stuck) > 1 else ''} {', '.join(map(str, stuck))}"
         text = f"no change of {taxels}, or of one axis, from some time on: left out since"
-        found.append(Finding(name, "stuck", text))
-    return found
+        findings.append(Finding(name, "stuck", text))
+    return findings
 
 
 def hidden_labels(path: Path) -> Finding | None:
@@ -144,7 +144,7 @@ def hidden_labels(path: Path) -> Finding | None:
     if data is None:
         return None
     file = decode_labels(data, beside)
-    authors = [file.author, *(each.author for own in file.modules.values() for each in own)]
+    authors = [file.author, *(x.author for labels in file.modules.values() for x in labels)]
     rule = next((author for author in authors if author.startswith("rule:")), None)
     if rule is None or not (n_inside := summary_of(path).n_inside):
         return None
@@ -209,7 +209,7 @@ def _of_module(module: ModuleScan) -> Iterator[tuple[FindingKind, str]]:
 
 
 MAX_RATE_RATIO = 5.0
-"""Ratio of the rate of a module and that of its sensor from which on it is unlikely."""
+"""A rate of a module is unlikely from this multiple of its sensor's rate on."""
 MIN_CLOCK_DIFFERENCE = 1e-3
 """Smallest relative difference of the clocks of two modules that is reported."""
 MAX_GAPS_SHOWN = 2
@@ -218,8 +218,8 @@ DRIFT_KEY = "clock_drift"
 _ORDER: tuple[FindingKind, ...] = (
     "dead", "copy", "invalid", "stuck", "unlikely_rate", "unit", "sentinel", "zeros", "unsigned",
     "wraps", "gravity", "angle", "norm", "turned", "starts_loaded", "axes", "gaps",
-    "cross_talk", "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel",
-    "many_taxels", "no_contact", "no_labels",
+    "clock_drift", "constant", "hidden_labels", "held", "rate", "one_taxel", "many_taxels",
+    "no_contact", "no_labels",
 )  # fmt: skip
 
 
@@ -231,22 +231,24 @@ def with_oddities(findings: list[Finding], scan: FindingsScan, path: Path) -> li
         scan: of the recording.
         path: of the recording, for the commands.
     """
-    found = [*findings]
-    modules = {name: one.force for name, one in scan.modules.items() if one.force.n_samples > 1}
+    all_findings = [*findings]
+    modules = {name: x.force for name, x in scan.modules.items() if x.force.n_samples > 1}
     for name, module in modules.items():
         nominal = scan.modules[name].sensor.rate
         ratio = max(module.rate / nominal, nominal / module.rate)
         if ratio > MAX_RATE_RATIO:
             text = f"{module.rate:.4g} Hz where the sensor has {nominal:g}: if the times have "
             text += "another unit, import with --columns time=COLUMN:ms (or s, us, ns)"
-            found.append(Finding(name, "unlikely_rate", text))
+            all_findings.append(Finding(name, "unlikely_rate", text))
         if module.n_gaps:
-            found.append(Finding(name, "gaps", _gaps(module, shown_origin(scan.recording.start))))
-    found += _drifts(modules, scan.recording.metadata.get(DRIFT_KEY))
-    if modules and not any(one.labels for one in scan.modules.values()):
+            all_findings.append(
+                Finding(name, "gaps", _gaps(module, shown_origin(scan.recording.start)))
+            )
+    all_findings += _drifts(modules, scan.recording.metadata.get(DRIFT_KEY))
+    if modules and not any(x.labels for x in scan.modules.values()):
         text = f"no labels: draw them with holdfast label {path.name}"
-        found.append(Finding("", "no_labels", text))
-    return sorted(found, key=lambda finding: _ORDER.index(finding.kind))
+        all_findings.append(Finding("", "no_labels", text))
+    return sorted(all_findings, key=lambda finding: _ORDER.index(finding.kind))
 
 
 def _gaps(module: Tactile, origin: float) -> str:
@@ -261,17 +263,17 @@ def _gaps(module: Tactile, origin: float) -> str:
 
 def _drifts(modules: dict[str, Tactile], of_bag: object) -> list[Finding]:
     """Return findings about clocks of modules that run at different speeds."""
-    found = []
+    drifts = []
     if isinstance(of_bag, float):
         text = f"the bag's clock gains {6e4 * of_bag:+.3g} ms a minute on that of the device: "
-        found.append(Finding("", "clock_drift", text + "do not join its times with other topics"))
-    for (first, one), (second, other) in combinations(modules.items(), 2):
-        lengths = np.array([module.times[-1] - module.times[0] for module in (one, other)])
+        drifts.append(Finding("", "clock_drift", text + "do not join its times with other topics"))
+    for (first, base), (second, other) in combinations(modules.items(), 2):
+        lengths = np.array([module.times[-1] - module.times[0] for module in (base, other)])
         drift = lengths[1] / lengths[0] - 1
         # Only modules that have lost nothing last equally long by the same clock.
-        is_whole = one.n_samples == other.n_samples and not one.n_gaps + other.n_gaps
+        is_whole = base.n_samples == other.n_samples and not base.n_gaps + other.n_gaps
         if is_whole and abs(drift) >= MIN_CLOCK_DIFFERENCE:
             text = f"as many samples as {first} in {lengths[1]:.5g} s, where that has "
             text += f"{lengths[0]:.5g} s: one of their clocks drifts"
-            return [*found, Finding(second, "clock_drift", text)]
-    return found
+            return [*drifts, Finding(second, "clock_drift", text)]
+    return drifts

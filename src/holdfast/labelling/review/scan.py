@@ -1,4 +1,4 @@
-"""What findings need of a recording, which may come in parts: all but its readings."""
+"""Scan of a recording, read in parts, from which findings are made: all but its readings."""
 
 from dataclasses import replace
 from functools import cached_property
@@ -8,10 +8,10 @@ import numpy as np
 from holdfast.detection.plan import first_finite
 from holdfast.io.importers.layout_findings import LayoutFinding, layout_findings
 from holdfast.kernel.batch import fill_fingertip_force
-from holdfast.labelling.server.fingertip_forces import force_sensor
-from holdfast.live.module_checks import CHECK_INTERVAL, HoldDrift, Likeness, ModuleComparison
+from holdfast.live.readings_monitor import CHECK_INTERVAL, HoldDrift
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import HELD_ROWS, held_rows
+from holdfast.sensors import Sensor
 from holdfast.sensors.types import Array, Flags
 
 LAYOUT_SAMPLES = 20_000
@@ -21,7 +21,7 @@ SCAN_BLOCK_SAMPLES = 4096
 
 
 class ModuleScan:
-    """What is kept of the samples of a module: 33 bytes of each.
+    """Forces, repeats and ranges of a module, from all its samples: 33 bytes of each.
 
     Args:
         module: a part of it, which is not added.
@@ -43,8 +43,8 @@ class ModuleScan:
         self.lowest, self.highest = np.inf, -np.inf
         self.rows_per_update = 1.0
         self.layout: list[LayoutFinding] = []
-        # Parts of the arrays, which `add` appends to; and what it needs of the part before: the end
-        # of its times, and its last sample. The first finite sample is the zero of all forces.
+        # Chunks collected so far, and the last time and sample of the previous chunk. The first
+        # finite sample is the zero of all forces.
         self._times, self._end = [np.empty(0)], -np.inf
         self._forces = [np.empty((0, 3))]
         self._repeats = [np.empty(0, dtype=np.bool_)]
@@ -55,8 +55,8 @@ class ModuleScan:
         """Add the next samples."""
         labels = list(module.labels)
         if labels and self.labels and self._end < self.labels[-1].end:
-            # The label goes on after the last sample of the part before: if it begins again
-            # with the first sample here, and is the same else, the parts have cut it.
+            # An identical label at the start of this chunk is the same label, which was split at
+            # the boundary.
             before, after = self.labels[-1], labels[0]
             is_cut = after.start <= float(module.times[0])
             if is_cut and replace(after, start=before.start, end=before.end) == before:
@@ -100,7 +100,12 @@ class ModuleScan:
         A tare is linear: it gives the same force as of all taxels.
         """
         forces = np.concatenate(self._forces)[:, None]
-        return Tactile(force_sensor(self.sensor), np.concatenate(self._times), forces)
+        skin = self.sensor
+        tip = Sensor(
+            f"force of {skin.name}", np.zeros((1, 3)), np.eye(3)[None], skin.normal, skin.rate,
+            skin.unit,
+        )  # fmt: skip
+        return Tactile(tip, np.concatenate(self._times), forces)
 
     @cached_property
     def drift(self) -> HoldDrift:
@@ -113,19 +118,16 @@ class ModuleScan:
 
 
 class FindingsScan:
-    """What is kept of a recording.
+    """Scan of a recording.
 
     Attributes:
         modules: by name.
         n_truth: number of samples of the truth.
-        alike: modules with the same readings, or with cross-talk.
     """
 
     def __init__(self) -> None:
         self.modules: dict[str, ModuleScan] = {}
         self.n_truth = 0
-        self.alike: list[Likeness] = []
-        self._comparison = ModuleComparison()
         self._markers: list[tuple[float, str]] = []
         self._last: Recording | None = None
 
@@ -136,7 +138,6 @@ class FindingsScan:
                 self.modules[name] = ModuleScan(module)
             self.modules[name].add(module)
         self.n_truth += 0 if part.truth is None else len(part.truth.times)
-        self.alike += self._comparison.update_recording(part)
         self._markers += part.markers
         self._last = replace(part, modules={n: m.slice(0, 1) for n, m in part.modules.items()})
 

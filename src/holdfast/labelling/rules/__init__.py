@@ -64,11 +64,11 @@ def propose(
         raise ValueError(f"unknown rule {rule!r}; there are {', '.join(RULES)}")
     by_video = rule == "tracking" and not {"video", "motion"}.isdisjoint(parameters)
     chosen = _BY_VIDEO if by_video else _RULES[rule]
-    known = [*chosen.arguments, *chosen.threshold_names]
-    if unknown := sorted(set(parameters) - set(known)):
+    names = [*chosen.arguments, *chosen.threshold_names]
+    if unknown := sorted(set(parameters) - set(names)):
         raise ValueError(
             f"rule {rule!r} has no parameter {', '.join(unknown)}; "
-            f"its parameters are {', '.join(known)}"
+            f"its parameters are {', '.join(names)}"
         )
     arguments = {name: value for name, value in parameters.items() if name in chosen.arguments}
     if chosen.thresholds is not None:

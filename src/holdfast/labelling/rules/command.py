@@ -123,8 +123,10 @@ def command_word(text: str) -> str | None:
     words = re.findall(r"[a-z]+", text.lower())
     if "contact" in words and "no" in words:  # two words, of which neither is a synonym alone
         return "free"
-    known = {synonym: word for word, synonyms in WORDS.items() for synonym in synonyms}
-    word = next((known[text_word] for text_word in words if text_word in known), None)
+    word_of_synonym = {synonym: word for word, synonyms in WORDS.items() for synonym in synonyms}
+    word = next(
+        (word_of_synonym[text_word] for text_word in words if text_word in word_of_synonym), None
+    )
     if word in ("disturbance", "slip") and any(end in words for end in END_WORDS):
         return "locked"
     return word
@@ -134,9 +136,9 @@ def _timeline(
     finger: FingerForce, hand: HandForce, commands: list[ProtocolMarker], opening: float
 ) -> StateTimeline:
     timeline = StateTimeline.unknown(hand.times)
-    times, known = hand.times, finger.known
+    times, has_force = hand.times, finger.known
     if commands[0].word == "closing":
-        timeline.set_state(known & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
+        timeline.set_state(has_force & (times < commands[0].time), NO_CONTACT, None, CLEAR_RATIO)
     groups = [list(group) for _, group in groupby(commands, key=lambda command: command.word)]
     for group, following in pairwise([*groups, [ProtocolMarker(np.inf, "")]]):
         # A repeated marker changes nothing, but a person who begins a push twice has forgotten to
@@ -147,7 +149,7 @@ def _timeline(
         open_ended = command.word == "disturbance" and not ended
         ratio = OPEN_ENDED_RATIO if open_ended else CLEAR_RATIO
         state, cause = _STATE_OF_WORD[command.word]
-        inside = known & (times >= command.time) & (times < end)
+        inside = has_force & (times >= command.time) & (times < end)
         timeline.set_state(inside, state, cause, ratio)
         if command.word == "released":
             timeline.set_state(inside & (times >= command.time + opening), NO_CONTACT, None, ratio)

@@ -297,11 +297,11 @@ def _falls_below_start(module: Tactile) -> bool:
         force = tared_force(module, DEFAULT_TARE, offline=True).force
     except ValueError:  # no finite sample at the start
         return False
-    known = np.isfinite(force[:, 0])  # a row is finite or NaN
-    if not known.any():
+    is_finite = np.isfinite(force[:, 0])  # a row is finite or NaN
+    if not is_finite.any():
         return False
-    force = force if known.all() else force[known]
-    times, normal = module.times[known], force @ module.sensor.normal
+    force = force if is_finite.all() else force[is_finite]
+    times, normal = module.times[is_finite], force @ module.sensor.normal
     noise = float(normal[times < times[0] + DEFAULT_TARE.seconds].std())
     if noise == 0:  # a start without noise shows nothing about the load
         return False

@@ -127,7 +127,7 @@ def motion_of(
     if point is not None:
         lever = np.einsum("nji,nj->ni", matrix, point - position)
     velocity = rate[:, :3] + np.einsum("nij,nj->ni", rate[:, 3:].reshape(-1, 3, 3), lever)
-    known = covered(grid, times, MAX_POSE_GAP)
+    is_seen = covered(grid, times, MAX_POSE_GAP)
     noise = _slope_noise(numbers, float(np.median(np.diff(times))))
     lever_length = float(np.median(np.linalg.norm(lever, axis=1)))
     # |dR/dt| = sqrt(2) spin, in the Frobenius norm: of the noise here, of the motion below.
@@ -135,11 +135,11 @@ def motion_of(
     return RelativeMotion(
         position=position,
         matrix=matrix,
-        speed=np.where(known, np.linalg.norm(velocity, axis=1), np.nan),
-        spin=np.where(known, np.linalg.norm(rate[:, 3:], axis=1) / np.sqrt(2), np.nan),
+        speed=np.where(is_seen, np.linalg.norm(velocity, axis=1), np.nan),
+        spin=np.where(is_seen, np.linalg.norm(rate[:, 3:], axis=1) / np.sqrt(2), np.nan),
         speed_noise=float(np.hypot(np.linalg.norm(noise[:3]), lever_length * spin_noise)),
         spin_noise=spin_noise,
-        known=known,
+        known=is_seen,
     )
 
 
@@ -154,7 +154,7 @@ def slope(values: Array, period: float) -> Array:
     return np.asarray(convolve1d(values, weights[::-1], axis=0, mode="nearest"))
 
 
-def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockOffset:
+def clock_offset(seen: Array, felt: Array, is_seen: Mask, period: float) -> ClockOffset:
     """Return the offset of the clock of poses against the clock of tactile samples.
 
     Ranks of the two signals are correlated at every offset, so that one large peak does not
@@ -163,15 +163,15 @@ def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockO
     Args:
         seen: (n,) speed by the poses, at least 0, on the grid.
         felt: (n,) change of the force, at least 0, on the grid.
-        known: (n,) where there are poses.
+        is_seen: (n,) where there are poses.
         period: of the grid [s].
     """
     reach = min(round(MAX_CLOCK_OFFSET / period), len(seen) // 2)
-    a, b = _ranks(seen, known), _ranks(felt, np.ones_like(known))
+    a, b = _ranks(seen, is_seen), _ranks(felt, np.ones_like(is_seen))
     correlations = []
     for shift in range(-reach, reach + 1):  # b against a, which is delayed by `shift`
         first, last = max(0, -shift), min(len(a), len(a) - shift)
-        mask = known[first:last]
+        mask = is_seen[first:last]
         x, y = a[first:last][mask], b[first + shift : last + shift][mask]
         is_constant = len(x) < 3 or x.std() == 0 or y.std() == 0
         correlation = 0.0 if is_constant else float(np.corrcoef(x, y)[0, 1])
@@ -183,7 +183,7 @@ def clock_offset(seen: Array, felt: Array, known: Mask, period: float) -> ClockO
 def _slope_noise(values: Array, step: float) -> Array:
     """Return (k,) standard deviations of the slope from pose noise alone.
 
-    Smooth motion adds little to second differences, and the median is that of the calmer half.
+    Smooth motion adds little to second differences, and the median ignores the livelier half.
     """
     if len(values) < 3:
         return np.zeros(values.shape[1])
@@ -197,9 +197,9 @@ def _slope_noise(values: Array, step: float) -> Array:
 def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
     """Return the track at other times; NaN in gaps longer than MAX_POSE_GAP."""
     seen = track.seen
-    known = covered(times, track.times[seen], MAX_POSE_GAP)
+    is_covered = covered(times, track.times[seen], MAX_POSE_GAP)
     positions, quaternions = np.full((len(times), 3), np.nan), np.full((len(times), 4), np.nan)
-    if known.any():
+    if is_covered.any():
         seen_times = track.times[seen]
         turns = track.quaternions[seen]
         # q and -q are one rotation: between neighbours of opposite signs the mean would be any.
@@ -207,9 +207,9 @@ def _interpolated(track: PoseTrack, times: Array) -> PoseTrack:
         signs = np.concatenate([[1.0], np.cumprod(np.where(flips == 0, 1.0, flips))])
         values = np.concatenate([track.positions[seen], turns * signs[:, None]], axis=1)
         between = np.stack([np.interp(times, seen_times, column) for column in values.T], axis=1)
-        positions[known] = between[known, :3]
-        turns = between[known, 3:]
-        quaternions[known] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
+        positions[is_covered] = between[is_covered, :3]
+        turns = between[is_covered, 3:]
+        quaternions[is_covered] = turns / np.linalg.norm(turns, axis=1, keepdims=True)
     return PoseTrack(times, positions, quaternions)
 
 
@@ -219,10 +219,10 @@ def _rotation(quaternions: Array) -> "Rotation":
     return Rotation.from_quat(np.roll(quaternions, -1, axis=-1))  # SciPy has the scalar last
 
 
-def _ranks(values: Array, known: Mask) -> Array:
+def _ranks(values: Array, is_seen: Mask) -> Array:
     """Return ranks between 0 and 1 where values are known; 0 elsewhere."""
     ranks = np.zeros(len(values))
-    inside = values[known]
+    inside = values[is_seen]
     order = np.argsort(np.argsort(inside, kind="stable"), kind="stable")
-    ranks[known] = order / max(len(inside) - 1, 1)
+    ranks[is_seen] = order / max(len(inside) - 1, 1)
     return ranks

@@ -188,13 +188,13 @@ def tip_tracks_of(poses: Poses, fingers: Sequence[str]) -> dict[str, PoseTrack |
     if not poses.tip_tracks:
         return dict.fromkeys(fingers)
     tips = poses.tip_tracks
-    known: dict[str, PoseTrack | None] = {f: tips[f] for f in fingers if f in tips}
-    if not known:
+    tracks: dict[str, PoseTrack | None] = {f: tips[f] for f in fingers if f in tips}
+    if not tracks:
         raise RecordingError(
             f"{poses.source} has poses of {', '.join(tips)}; "
             f"the recording's fingers are {', '.join(fingers)}"
         )
-    return known
+    return tracks
 
 
 def _track(times: Array, pose: npt.NDArray[np.generic]) -> PoseTrack:

@@ -106,7 +106,7 @@ def propose(
     change = {name: _change_ratio(finger, rule) for name, finger in hand.fingers.items()}
     # A change of two fingers is one of the object, and so of every finger that touches it.
     shared = np.sum([ratio > 1 for ratio in change.values()], axis=0) >= 2
-    # The window shows a change half of it too early and too late, which fills the rest of a gap.
+    # The window widens each change by half its length on both sides: shorter gaps are closed.
     gap = n_samples_of(rule.merge - rule.window, hand.period)
     changing, timelines = {}, {}
     for name, finger in hand.fingers.items():
@@ -185,7 +185,7 @@ class _GraspLabeller:
         touching = finger.contact & self._inside
         if not touching.any():
             return
-        # What is set later replaces what was set before: the ends of a grasp go last.
+        # A later state replaces an earlier one: the ends of a grasp go last.
         timeline.set_state(touching, STABLE, None, evidence_ratio(1.0, ratio))
         timeline.set_state(touching & self._changing[name], UNSTABLE, Cause.DISTURBANCE, ratio)
         before = np.arange(len(touching)) < self._locked

@@ -180,9 +180,9 @@ def _clock_offset(poses: Poses, tracks: Mapping[str, PoseTrack], hand: HandForce
         return ClockOffset(0.0, 1.0)
     motions = [motion_of(track, hand.times) for track in tracks.values()]
     seen = np.nanmax([np.where(motion.known, motion.speed, 0.0) for motion in motions], axis=0)
-    known = np.any([motion.known for motion in motions], axis=0)
+    is_seen = np.any([motion.known for motion in motions], axis=0)
     felt = np.sum([hand.fingers[name].change(UNSTABLE_MARGIN) for name in tracks], axis=0)
-    return clock_offset(seen, felt, known, hand.period)
+    return clock_offset(seen, felt, is_seen, hand.period)
 
 
 class _FingerLabeller:
@@ -205,7 +205,7 @@ class _FingerLabeller:
         if self._rule.measure == "displacement":
             ratio = np.where(motion.known, self._displacement_ratio(motion, point), 0.0)
         moving = self._moving(ratio)
-        # What is set later replaces what was set before: first what holds still, then what moves,
+        # A later state replaces an earlier one: first what holds still, then what moves,
         # then what slides within it; no contact, and the ends of contacts, last.
         held = self._contact & motion.known
         timeline.set_state(held, STABLE, None, evidence_ratio(1.0, ratio))
@@ -287,20 +287,20 @@ class _FingerLabeller:
         inside[start + last : end] = unstable[last:]
         timeline.set_cause(inside, Cause.RELEASED)
 
-    def _label_loss(self, timeline: StateTimeline, known: Mask, start: int, end: int) -> None:
+    def _label_loss(self, timeline: StateTimeline, is_seen: Mask, start: int, end: int) -> None:
         """Label a loss if the object is out of sight when the force ends, and stays so."""
         n = n_samples_of(OUT_OF_SIGHT_TIME, self._finger.period)
-        seen = np.flatnonzero(known[start:end])
+        seen = np.flatnonzero(is_seen[start:end])
         # Never in sight, or seen again soon after the end of the force: no loss is known.
-        if not len(seen) or end == len(known) or known[max(end - 1, start) : end + n].any():
+        if not len(seen) or end == len(is_seen) or is_seen[max(end - 1, start) : end + n].any():
             return
-        unseen = np.zeros(len(known), dtype=bool)
+        unseen = np.zeros(len(is_seen), dtype=bool)
         unseen[max(start + seen[-1] + 1, end - n) : end] = True
         timeline.set_state(unseen & self._finger.known, UNSTABLE, Cause.LOST, LOSS_RATIO)
         # The time without contact that follows at once has the same cause.
         after = timeline.codes[end:] != NO_CONTACT
         unseen[:] = False
-        unseen[end : end + int(np.argmax(after)) if after.any() else len(known)] = True
+        unseen[end : end + int(np.argmax(after)) if after.any() else len(is_seen)] = True
         timeline.set_cause(unseen, Cause.LOST)
 
 

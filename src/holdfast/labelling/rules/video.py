@@ -86,7 +86,7 @@ class SeenSlip(NamedTuple):
 
 
 class Film(NamedTuple):
-    """What a film shows beside the motion of fingertips on the object, on its regular grid.
+    """Measurements of a film beside the motion of fingertips on the object, on a regular grid.
 
     Attributes:
         levels: (n,) brightness.
@@ -102,8 +102,8 @@ class Film(NamedTuple):
         places = []
         for pose in poses:
             seen = np.isfinite(pose[:, 0, 2])
-            known = [np.interp(grid, times[seen], pose[seen, k, 2]) for k in (0, 1)]
-            places.append(np.stack(known, axis=1))
+            heights = [np.interp(grid, times[seen], pose[seen, k, 2]) for k in (0, 1)]
+            places.append(np.stack(heights, axis=1))
         return cls(np.interp(grid, times, levels), np.array(places))
 
     def what_moves(self, rows: slice) -> str:
@@ -186,7 +186,9 @@ def propose(
             stuck = held.copy()
             for slip in slips:
                 stuck &= (at <= slip.onset - SLIP_MARGIN) | (at >= slip.end + SLIP_MARGIN)
-        settled = np.all([label_states(own, at) == STABLE for own in base.values()], axis=0)
+        settled = np.all(
+            [label_states(finger_labels, at) == STABLE for finger_labels in base.values()], axis=0
+        )
         slips = [
             slip._replace(other=film.what_moves(rows))
             if film and settled[rows := slice(*np.searchsorted(at, (slip.onset, slip.end)))].all()
@@ -252,14 +254,14 @@ def unexplained(tip: TipMotion, force: Array, held: Mask, n: int) -> Array:
         held: (n_pictures,) where it is fitted.
         n: pictures between the two ends of a change.
     """
-    known = np.column_stack([force, tip.turns])
+    predictors = np.column_stack([force, tip.turns])
     both = held[n:] & held[:-n]
-    if both.sum() < 4 * known.shape[1]:
+    if both.sum() < 4 * predictors.shape[1]:
         # Too few changes for a fit: no motion remains, and so no slip.
         return tip.position - tip.position
-    change = known[n:] - known[:-n]
+    change = predictors[n:] - predictors[:-n]
     fit, _ = robust_fit(change[both], (tip.position[n:] - tip.position[:-n])[both])
-    return np.asarray(tip.position - known @ fit)
+    return np.asarray(tip.position - predictors @ fit)
 
 
 def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[SeenSlip]:
@@ -287,7 +289,7 @@ def seen_slips(times: Array, rest: Array, held: Mask, rule: VideoRule) -> list[S
         before = np.median(rest[max(first - n_rest, 0) : first + 1], axis=0)
         after = np.median(rest[last - 1 : last - 1 + n_rest], axis=0)
         away = np.linalg.norm(after - before)
-        # What is fitted as stuck must not reach into the slip before.
+        # The stretch that is fitted as stuck must not reach into the slip before.
         start, free = max(first - round(rule.before / step), free), last - n
         if away < max(1e3 * rule.slid, 6 * noise):
             continue  # a part of a longer motion that came back by itself: nothing slid

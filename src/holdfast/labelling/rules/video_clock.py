@@ -155,11 +155,11 @@ def _coarse_offset(
     from scipy.signal import correlate
 
     step = float(grid[1] - grid[0])
-    own = np.arange(recording.start, recording.end, step)
+    seconds = np.arange(recording.start, recording.end, step)
     n = max(round(COARSE_TIME / step), 1)
-    shares: Array = np.zeros(len(grid) + len(own) - 2 * n - 1)
+    shares: Array = np.zeros(len(grid) + len(seconds) - 2 * n - 1)
     for finger, tip in tips.items():
-        force = force_of(recording, finger, tare)(own)
+        force = force_of(recording, finger, tare)(seconds)
         moved, felt = (_cut(values[n:] - values[:-n]) for values in (tip.position, force))
         products = np.array([[correlate(f, m) for f in felt.T] for m in moved.T])
         inverse = np.linalg.pinv(felt.T @ felt)
@@ -172,7 +172,7 @@ def _coarse_offset(
     # The correlation begins with the largest shift; there is none at the last index of `moved`.
     shift = best - (len(grid) - n - 1)
     clear = shares[best] / max(others.max(initial=0.0), 1e-12)
-    return float(own[0] - grid[0] + shift * step), float(clear)
+    return float(seconds[0] - grid[0] + shift * step), float(clear)
 
 
 def _cut(changes: Array) -> Array:

@@ -79,7 +79,7 @@ class TipMotion(NamedTuple):
 
 
 def regular_grid(times: Array) -> Array:
-    """Return times one usual step apart, over those of the pictures [s]."""
+    """Return times one usual step apart, over the duration of the pictures [s]."""
     step = float(np.median(np.diff(times)))
     return np.asarray(times[0] + step * np.arange(int((times[-1] - times[0]) / step) + 1))
 
@@ -109,11 +109,11 @@ def tip_motions(
     }
     good = [body for body, share in shares.items() if share >= MIN_SEEN]
     if len(times) < 3 or OBJECT not in good or len(good) < 2:
-        found = ", ".join(
+        names = ", ".join(
             f"{body} ({stickers[body]}) in {share:.0%}" for body, share in shares.items() if share
         )
         raise RecordingError(
-            f"{video}: stickers seen in its {len(times)} pictures: {found or 'none'}; that of the "
+            f"{video}: stickers seen in its {len(times)} pictures: {names or 'none'}; that of the "
             f"object ({stickers[OBJECT]}) and of a finger expected in at least {MIN_SEEN:.0%} "
             "(`holdfast label markers` prints them)"
         )
@@ -189,12 +189,12 @@ def measured_motion(path: Path, column: str | None = None) -> tuple[Array, TipMo
         flips = np.cumsum((values[1:, -4:] * values[:-1, -4:]).sum(axis=1) < 0) % 2
         values[1:, -4:] *= 1 - 2 * flips[:, None]
     grid = regular_grid(times)
-    known = np.stack([np.interp(grid, times, part) for part in values.T], axis=1)
-    position, turns = 1e3 * known[:, : len(kinds[0])], known[:, :0]
+    on_grid = np.stack([np.interp(grid, times, part) for part in values.T], axis=1)
+    position, turns = 1e3 * on_grid[:, : len(kinds[0])], on_grid[:, :0]
     if len(kinds[-1]) == 4:  # quaternions, with their scalar first
         if not (np.abs(np.linalg.norm(values[:, -4:], axis=1) - 1) < 0.1).all():
             raise RecordingError(f"{path}: unit quaternions qw,qx,qy,qz expected in each row")
-        turned = Rotation.from_quat(np.roll(known[:, -4:], -1, axis=1))
+        turned = Rotation.from_quat(np.roll(on_grid[:, -4:], -1, axis=1))
         turns = TURN_SCALE * (turned * turned[0].inv()).as_rotvec()
     if len(kinds[0]) == 4:  # no positions: what turns slides at the edge of the contact
         position, turns = 1e3 * SPIN_LEVER / TURN_SCALE * turns, turns[:, :0]
@@ -225,16 +225,16 @@ def force_of(recording: Recording, finger: str, tare: Tare) -> Callable[[Array],
     return at
 
 
-def robust_fit(known: Array, change: Array) -> tuple[Array, Array]:
+def robust_fit(predictors: Array, change: Array) -> tuple[Array, Array]:
     """Return the (k, 2) map of least distances, and the (n,) distances that it leaves [mm]."""
     # Squares weighted by 1 / distance make a fit of least distances, which outliers hardly move.
-    weights = np.ones(len(known))
+    weights = np.ones(len(predictors))
     for _ in range(15):
-        weighted = known * weights[:, None]
+        weighted = predictors * weights[:, None]
         # Where nothing turns, the columns of the turns are 0 and the equations singular.
-        ridge = 1e-5 * len(known) * np.median(weights) * np.eye(known.shape[1])
-        fit = np.linalg.solve(weighted.T @ known + ridge, weighted.T @ change)
-        distances = np.linalg.norm(change - known @ fit, axis=1)
+        ridge = 1e-5 * len(predictors) * np.median(weights) * np.eye(predictors.shape[1])
+        fit = np.linalg.solve(weighted.T @ predictors + ridge, weighted.T @ change)
+        distances = np.linalg.norm(change - predictors @ fit, axis=1)
         weights = 1 / np.maximum(distances, 0.02)  # below the noise of a position, all count alike
     return np.asarray(fit), np.asarray(distances)
 

@@ -23,14 +23,12 @@ from holdfast.labelling.server.documents import (
 from holdfast.labelling.server.signals import DEFAULT_POINTS
 from holdfast.labelling.server.store import ConflictError, ReadOnlyError, parse_labels
 from holdfast.labelling.server.workspace import Workspace
-from holdfast.web.body import BodyReader, json_error
+from holdfast.web.body import json_error, read_body
 from holdfast.web.guard import Guard, Handler
 
 MAX_REQUEST_BYTES = 64 << 20
 """Largest request of a page, which sends all labels of a recording: some 500,000 [bytes]. To save
 them takes up to eight times as much memory."""
-MAX_PENDING_BYTES = 2 * MAX_REQUEST_BYTES
-"""Largest sum of all requests that have not arrived completely [bytes]."""
 
 PAGE = Path(str(resources.files("holdfast.labelling") / "page"))
 """Files of the labelling page."""
@@ -50,8 +48,9 @@ class LabellingService:
 
     def __init__(self, workspace: Workspace, guard: Guard) -> None:
         self._workspace = workspace
-        self._bodies = BodyReader(MAX_REQUEST_BYTES, MAX_PENDING_BYTES, web.HTTPUnprocessableEntity)
-        self.app = web.Application(middlewares=[guard.middleware, _errors_as_json])
+        self.app = web.Application(
+            middlewares=[guard.middleware, _errors_as_json], client_max_size=MAX_REQUEST_BYTES
+        )
         recording = r"/api/v1/recordings/{id:\d+}"
         self.app.add_routes(
             [
@@ -87,7 +86,7 @@ class LabellingService:
 
     async def _save(self, request: web.Request) -> web.Response:
         index = self._index(request)
-        body = await self._bodies.read(request, SaveRequest)
+        body = await read_body(request, SaveRequest, web.HTTPUnprocessableEntity)
 
         def save() -> SaveReply:
             stored = self._workspace.save(
@@ -100,7 +99,7 @@ class LabellingService:
 
     async def _propose(self, request: web.Request) -> web.Response:
         index = self._index(request)
-        body = await self._bodies.read(request, ProposeRequest)
+        body = await read_body(request, ProposeRequest, web.HTTPUnprocessableEntity)
 
         def propose() -> ProposeReply:
             rule, proposals = self._workspace.propose(index, body.rule, body.parameters)

@@ -1,13 +1,13 @@
 """Signals that the labelling page plots: force and sigma at any zoom, and change points.
 
-Zooming takes a few milliseconds: minima and maxima of 2, 4, 8, ... neighbouring samples are
+Zooming takes a few milliseconds: minima and maxima of 16, 256, ... neighbouring samples are
 computed once. Edges of labels snap to change points. A change point is where the force begins or
 ends to change: within the next instants it moves much farther than it moved in the instants
 before, or the other way round.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import msgspec
@@ -48,11 +48,10 @@ MOVEMENT_NOISE_FACTOR = 2.0
 NOISE_SHARE = 0.01
 """Movement below this share of the largest force is noise, invisible on a plot."""
 
-FIRST_DEPTH = 4
-"""Minima and maxima of blocks of 2^4 samples and more are kept; those of smaller blocks need as
-much memory as the samples, and are computed of the part that is shown."""
+LEVEL_FACTOR = 16
+"""Each level of minima and maxima has so many times fewer values than the one before."""
 PART_SAMPLES = 1 << 16
-"""Samples of which minima, sigma and movements are computed at a time; it bounds the memory."""
+"""Samples of which sigma and movements are computed at a time; it bounds the memory."""
 
 Series = dict[str, list[float | None]]
 
@@ -75,57 +74,6 @@ class SignalPart(msgspec.Struct, frozen=True):
     fingers: dict[str, Series]
 
 
-class _Level(NamedTuple):
-    """Minima and maxima of blocks of neighbouring samples.
-
-    Blocks are on the last axis, so that NumPy computes many of them at a time.
-
-    Attributes:
-        times: (2, n) of the first and of the last sample of each block [s].
-        low: (n_series, n) minima; NaN where all samples are unknown.
-        high: (n_series, n) maxima.
-        falls: (n_series, n) whether the maximum comes before the minimum.
-    """
-
-    times: Array
-    low: npt.NDArray[np.floating]
-    high: npt.NDArray[np.floating]
-    falls: npt.NDArray[np.bool_]
-
-    def part(self, blocks: slice) -> "_Level":
-        """Return some of the blocks."""
-        low, high, falls = self.low[:, blocks], self.high[:, blocks], self.falls[:, blocks]
-        return _Level(self.times[:, blocks], low, high, falls)
-
-    @property
-    def n_blocks(self) -> int:
-        """Number of blocks."""
-        return len(self.times[0])
-
-    @classmethod
-    def joined(cls, levels: "Sequence[_Level]") -> "_Level":
-        """Return the blocks of several levels, one after the other."""
-        return cls(*(np.concatenate(arrays, axis=1) for arrays in zip(*levels, strict=True)))
-
-    def halved(self) -> "_Level":
-        """Return the next level: two neighbouring blocks become one; the last may stay alone."""
-        n = self.n_blocks // 2 * 2
-        first, second = self.part(slice(0, n, 2)), self.part(slice(1, n, 2))
-        # Not `fmin`: which block an extreme comes from says whether the maximum comes first.
-        unknown = np.isnan(first.low)
-        low_is_later = (second.low < first.low) | unknown
-        high_is_later = (second.high > first.high) | unknown
-        pairs = _Level(
-            np.stack([first.times[0], second.times[1]]),
-            np.where(low_is_later, second.low, first.low),
-            np.where(high_is_later, second.high, first.high),
-            (low_is_later & ~high_is_later)
-            | (low_is_later & high_is_later & second.falls)  # both are of one block
-            | (~low_is_later & ~high_is_later & first.falls),
-        )
-        return _Level.joined([pairs, self.part(slice(n, None))]) if n < self.n_blocks else pairs
-
-
 class FingerSignals:
     """Force and sigma of one finger, with minima and maxima at every zoom.
 
@@ -146,16 +94,10 @@ class FingerSignals:
             middles = (module.times[gaps - 1] + module.times[gaps]) / 2
             self.times = np.insert(module.times, gaps, middles)
             self.values = np.insert(values, gaps, np.nan, axis=0)
-        self._levels: dict[int, _Level] = {}  # by depth, of blocks of 2^depth samples
-        starts = range(0, max(len(self.times), 1), PART_SAMPLES)
-        depth = FIRST_DEPTH
-        level = _Level.joined(
-            [self._reduced(start, start + PART_SAMPLES, depth) for start in starts]
-        )
-        self._levels[depth] = level
-        while level.n_blocks > 2:
-            depth, level = depth + 1, level.halved()
-            self._levels[depth] = level
+        # Times and values: of all samples, then of minima and maxima of more and more of them.
+        self._levels = [(self.times, self.values)]
+        while len(self._levels[-1][0]) > 2 * LEVEL_FACTOR:
+            self._levels.append(extremes(*self._levels[-1], 2 * LEVEL_FACTOR))
 
     def part(self, start: float, end: float, points: int) -> tuple[bool, Series]:
         """Return whether all samples are included, and the series between two times.
@@ -167,33 +109,49 @@ class FingerSignals:
             end: of the part [s].
             points: a series has at most twice as many values.
         """
-        first = max(int(np.searchsorted(self.times, start)) - 1, 0)
-        last = min(int(np.searchsorted(self.times, end, side="right")) + 1, len(self.times))
-        n = last - first
-        if n <= 2 * points:
-            return True, _series(self.times[first:last], self.values[first:last])
-        depth = max(int(np.ceil(np.log2(n / max(points - 2, 1)))), 1)
-        depth = min(depth, max(self._levels))
-        # The blocks of 2^depth samples that contain the part: kept ones, or of few samples.
-        blocks = slice(first >> depth, ((last - 1) >> depth) + 1)
-        if depth in self._levels:
-            level = self._levels[depth].part(blocks)
-        else:
-            level = self._reduced(blocks.start << depth, blocks.stop << depth, depth)
-        # (2 n, n_series) minimum and maximum of each block, the earlier one first: a line through
-        # them goes the way that the samples go.
-        earlier = np.where(level.falls, level.high, level.low)
-        later = np.where(level.falls, level.low, level.high)
-        values = np.stack([earlier, later], axis=2).reshape(len(SERIES), -1).T
-        return False, _series(level.times.T.ravel(), values)
+        for times, values in reversed(self._levels):
+            first = max(int(np.searchsorted(times, start)) - 1, 0)
+            last = min(int(np.searchsorted(times, end, side="right")) + 1, len(times))
+            # The coarsest level with enough values.
+            if last - first >= 4 * points or times is self.times:
+                part = times[first:last], values[first:last]
+                break
+        size = -(-(last - first) // points)
+        return (True, _series(*part)) if size <= 2 else (False, _series(*extremes(*part, size)))
 
-    def _reduced(self, start: int, stop: int, depth: int) -> _Level:
-        """Return the blocks of samples `start` up to `stop`, which is a whole number of blocks."""
-        times, values = self.times[start:stop], np.ascontiguousarray(self.values[start:stop].T)
-        level = _Level(np.stack([times, times]), values, values, np.zeros(values.shape, dtype=bool))
-        for _ in range(depth):
-            level = level.halved()
-        return level
+
+def extremes(
+    times: Array, values: npt.NDArray[np.floating], size: int
+) -> tuple[Array, npt.NDArray[np.floating]]:
+    """Return two values of each block of neighbours: minimum and maximum, the earlier one first.
+
+    A line through them goes the way that the values go, and so does one through extremes of
+    extremes.
+
+    Args:
+        times: (n,) increasing [s].
+        values: (n, n_series); NaN where one is unknown.
+        size: number of neighbours in a block.
+
+    Returns:
+        The times of the first and last of each block (2 n_blocks,), and (2 n_blocks, n_series).
+
+    Example:
+        >>> extremes(np.arange(4.0), np.array([[3.0], [1.0], [2.0], [2.5]]), 4)[1].ravel().tolist()
+        [3.0, 1.0]
+    """
+    n_blocks = -(-len(times) // size)
+    filled = np.full((n_blocks * size, values.shape[1]), np.nan, values.dtype)
+    filled[: len(values)] = values
+    blocks = filled.reshape(n_blocks, size, -1)
+    unknown = np.isnan(blocks)
+    low = np.where(unknown, np.inf, blocks).argmin(axis=1)
+    high = np.where(unknown, -np.inf, blocks).argmax(axis=1)
+    indices = np.stack([np.minimum(low, high), np.maximum(low, high)], axis=1)
+    kept = np.take_along_axis(blocks, indices, axis=1).reshape(2 * n_blocks, -1)
+    begins = np.arange(n_blocks) * size
+    ends = np.minimum(begins + size, len(times)) - 1
+    return times[np.stack([begins, ends], axis=1).ravel()], kept
 
 
 class Signals(NamedTuple):
@@ -243,7 +201,7 @@ def signal_values(
 ) -> npt.NDArray[np.floating]:
     """Return (n, n_series) force and sigma of every sample [unit of the readings].
 
-    The baseline is subtracted from all samples, including those of the tare. Unknown values are
+    The baseline is subtracted from all samples, also during the tare. Unknown values are
     NaN.
 
     Args:
@@ -313,8 +271,10 @@ def change_points(times: Array, force: npt.NDArray[np.floating], period: float) 
     """
     from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
-    known = np.isfinite(force).all(axis=1)
-    known_times, values = (times, force) if known.all() else (times[known], force[known])
+    is_finite = np.isfinite(force).all(axis=1)
+    known_times, values = (
+        (times, force) if is_finite.all() else (times[is_finite], force[is_finite])
+    )
     n = max(round(COMPARED_TIME / period), 1)
     if len(known_times) <= 2 * n:
         return np.empty(0)

@@ -2,7 +2,7 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import RLock
@@ -12,15 +12,11 @@ from holdfast.detection import Tare
 from holdfast.detection.plan import TareArgument
 from holdfast.errors import RecordingError
 from holdfast.io import load_recording
+from holdfast.io.file_formats import SUFFIXES, format_module
 from holdfast.io.safe_reading import recording_errors
 from holdfast.labelling.rules import propose
 from holdfast.labelling.rules.forces import fitting_tare
 from holdfast.labelling.rules.poses import Poses, poses_of
-from holdfast.labelling.server.fingertip_forces import (
-    load_for_labelling,
-    read_header,
-    without_force,
-)
 from holdfast.labelling.server.signals import FingerSignals, Signals, change_points
 from holdfast.labelling.server.store import (
     ModuleLabels,
@@ -65,35 +61,20 @@ class OpenRecording:
 
     Attributes:
         path: of the file.
-        recording: with the labels of the file itself, not of the label file; with forces in place
-            of readings if it is long.
-        has_readings: whether it has the readings.
+        recording: with the labels of the file itself, not of the label file.
         tare: how the baseline is found.
     """
 
     path: Path
     recording: Recording
-    has_readings: bool
     tare: Tare
-    _fingers: dict[str, FingerSignals] = field(default_factory=dict)
-
-    def with_readings(self) -> Recording:
-        """Return the recording with its readings, which are read again if it is long.
-
-        Raises:
-            RecordingError: the recording cannot be read.
-        """
-        return self.recording if self.has_readings else load_recording(self.path, labels=False)
 
     @cached_property
     def signals(self) -> Signals:
-        """The signals that the page plots. The forces of a long recording are not kept."""
-        for name in tuple(self.recording.modules):
-            if name not in self._fingers:
-                self._fingers[name] = FingerSignals(self.recording.modules[name], self.tare)
-                if not self.has_readings:
-                    self.recording = without_force(self.recording, name)
-        return Signals(self.recording.start, self.recording.end, self._fingers)
+        """The signals that the page plots."""
+        modules = self.recording.modules.items()
+        fingers = {name: FingerSignals(module, self.tare) for name, module in modules}
+        return Signals(self.recording.start, self.recording.end, fingers)
 
     @cached_property
     def changes(self) -> Mapping[str, list[float]]:
@@ -164,10 +145,10 @@ class Workspace:
             if key not in self._open:
                 while len(self._open) >= MAX_RECORDINGS_IN_MEMORY:
                     self._open.popitem(last=False)
-                recording, has_readings = load_for_labelling(path)
+                recording = load_recording(path, labels=False)
                 with self._compute_lock:
                     tare = fitting_tare(recording, self._tare)
-                self._open[key] = OpenRecording(path, recording, has_readings, tare)
+                self._open[key] = OpenRecording(path, recording, tare)
             self._open.move_to_end(key)
             return self._open[key]
 
@@ -240,12 +221,11 @@ class Workspace:
             raise ValueError(f"parameter {refused[0]!r} given; a page may not set it")
         opened = self.open(index)
         with self._compute_lock:
-            recording = opened.with_readings()
-            chosen = rule or default_rule(recording, self._poses)
+            chosen = rule or default_rule(opened.recording, self._poses)
             arguments: dict[str, Any] = {"tare": opened.tare, **parameters}
             if chosen == "tracking":
                 arguments["tracking"] = self._poses
-            self._proposals[index] = propose(chosen, recording, **arguments)
+            self._proposals[index] = propose(chosen, opened.recording, **arguments)
         return chosen, self._proposals[index]
 
     def proposals(self, index: int) -> Proposals:
@@ -290,8 +270,11 @@ def summary_of(path: Path) -> RecordingSummary:
     Raises:
         RecordingError: the recording cannot be read.
     """
-    with recording_errors(path):
-        header, complete = read_header(path)
+    header, complete = None, False
+    if path.suffix in SUFFIXES:
+        with recording_errors(path):
+            header, groups, complete = format_module(path.suffix).read_groups(path)
+            getattr(groups, "close", lambda: None)()
     if header is None or not (complete and header.digest):
         # No header, or one of a recording that was cut off: only the samples say how long it is.
         recording = load_recording(path, labels=False)

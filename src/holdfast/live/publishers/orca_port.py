@@ -50,7 +50,7 @@ class OrcaPort:
                 )
         if not hasattr(os, "openpty"):
             raise SourceError("this system has no pseudo-terminals; Linux or macOS expected")
-        self._hand = OrcaHand({name: one.n_taxels for name, one in source.sensors.items()})
+        self._hand = OrcaHand({name: skin.n_taxels for name, skin in source.sensors.items()})
         self._at_rest = {name: np.zeros((n, 3)) for name, n in self._hand.fingers.items()}
         self._batcher = SampleBatcher(source.sensors, own_stamps=False)
         self.modules: dict[int, Sequence[str]] = {

@@ -25,7 +25,6 @@ from holdfast.errors import listen_error
 from holdfast.web.connections import (
     BACKLOG,
     HEADER_TIMEOUT,
-    ConnectionLimit,
     is_local,
     log_exceptions_briefly,
     refusal,
@@ -229,7 +228,7 @@ class XelaServer:
         if paused or not self._has_offset:  # time stamps never go back
             self._time_offset = max(self._time_offset, now - batch.time)
             self._has_offset = True
-        times = {name: one + self._time_offset for name, one in batch.times.items()}
+        times = {name: sample_time + self._time_offset for name, sample_time in batch.times.items()}
         packet = self.encoder.packet(batch.samples, batch.time + self._time_offset, now, times)
         return packet.decode()
 
@@ -252,7 +251,7 @@ class XelaServer:
                 self._serve_client, host, port,
                 process_request=self._refusal, compression=None, max_size=2**16,
                 open_timeout=HEADER_TIMEOUT, close_timeout=CLOSE_TIMEOUT, backlog=BACKLOG,
-                logger=_SILENT_LOGGER, create_connection=self._connection_class(),
+                logger=_SILENT_LOGGER,
             )  # fmt: skip
         except (OSError, OverflowError) as cause:
             self._start_failure = listen_error(host, port, cause)
@@ -262,21 +261,6 @@ class XelaServer:
             self._address = host, next(iter(server.sockets)).getsockname()[1]
             self._listening.set()
             await self._stop.wait()
-
-    def _connection_class(self) -> type[ServerConnection]:
-        """Return the class of connections that count for the limit of this server."""
-        limit = self._limit = ConnectionLimit.of_process()
-
-        class Connection(ServerConnection):
-            def connection_made(self, transport: asyncio.BaseTransport) -> None:
-                super().connection_made(transport)
-                limit.add(transport)
-
-            def connection_lost(self, error: Exception | None) -> None:
-                limit.remove(self.transport)
-                super().connection_lost(error)
-
-        return Connection
 
     def _refusal(self, client: ServerConnection, request: Request) -> Response | None:
         """Return the response to a client that is refused; None if it is accepted."""
@@ -297,7 +281,6 @@ class XelaServer:
         """Send "Welcome" to a client, then all packets until it disconnects."""
         with suppress(ConnectionClosed):
             await client.send(self.encoder.welcome().decode())
-            self._limit.mark_stream(client.transport)
             self._joining.add(client)
             if not self._restarts:
                 self._admit()
@@ -311,7 +294,9 @@ class XelaServer:
                 self._joining.discard(client)
 
     def _send(self, packet: str) -> None:
-        for client in _too_slow({one: _unsent_bytes(one) for one in self._clients}):
+        for client in _too_slow(
+            {connection: _unsent_bytes(connection) for connection in self._clients}
+        ):
             client.transport.abort()
         broadcast(self._clients, packet)
         self.n_packets += 1

@@ -15,7 +15,7 @@ import numpy as np
 
 from holdfast.contact import MERGE_GAP, MIN_HOLDING_FINGERS, ContactState, HandEstimate
 from holdfast.errors import SourceError
-from holdfast.live.health import HealthCheck, ModuleHealth, changes_since, module_health
+from holdfast.live.health import HealthCheck, ModuleHealth, findings_of, module_health
 from holdfast.live.stream_detector import TOUCHING, StreamUpdate
 from holdfast.live.teaching.steps import STEPS, Check, Step
 from holdfast.sensors import Sensor
@@ -71,11 +71,11 @@ STAGE_WORDS = {
     Stage.CHECK: ("ONE MOMENT", "The recording is checked."),
     Stage.DECIDE: ("GOOD", ""),
 }
-"""What a person does in each stage, and how; in ACT, the step has the words."""
+"""Instruction of each stage, and its explanation; in ACT they are those of the step."""
 
 
 class GraspResult(msgspec.Struct, frozen=True):
-    """What came of a grasp.
+    """Result of a grasp.
 
     Attributes:
         name: of the step.
@@ -102,7 +102,7 @@ class GraspResult(msgspec.Struct, frozen=True):
 
 
 class View(NamedTuple):
-    """What a person sees.
+    """Content of the screen.
 
     Attributes:
         title: which step and grasp.
@@ -413,6 +413,6 @@ class GuidedProtocol:
         }
         n = len(modules)
         text = f"is this your hand: {n} module{'s' * (n > 1)}, {', '.join(kinds)}?"
-        findings = changes_since(HealthCheck("", 0, modules), None)
+        findings = findings_of(HealthCheck("", 0, modules))
         # Dead taxels are left out by every model: they are named, and the protocol goes on.
         return True, " ".join([text, "; ".join(findings)]).rstrip()

@@ -69,5 +69,5 @@ STEPS = (
     ),
 )  # fmt: skip
 """The protocol: six grasps and three and a half minutes of samples, with 24 pulls and pushes of the
-whole hand. The open hand comes first: its noise and dead taxels decide about all that follows.
-Steps in which the object slides come before the last, so that nobody stops before the slips."""
+whole hand. The open hand comes first, to find noisy and dead taxels.
+The slides come before the last step, so that a person who stops early has recorded slips."""

@@ -47,7 +47,7 @@ class FaultInfo(Struct, frozen=True, kw_only=True):
 
 
 class OperatingPoint(Struct, frozen=True, kw_only=True):
-    """What the validation of the model expects at a probability threshold.
+    """Errors that the validation of the model expects at a probability threshold.
 
     Attributes:
         threshold: probability from which a contact is stable.

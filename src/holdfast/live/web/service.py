@@ -20,7 +20,7 @@ from holdfast.live.session import Session
 from holdfast.live.status import StatusPublisher, hello_document, recording_info
 from holdfast.live.stream_detector import StreamUpdate
 from holdfast.live.web import schema
-from holdfast.web.body import BodyReader, json_error
+from holdfast.web.body import json_error, read_body
 from holdfast.web.guard import Guard
 
 LIVE_DOCUMENT_RATE = 20.0
@@ -72,8 +72,7 @@ class LiveService:
         self._news = {"live": asyncio.Event(), "estimates": asyncio.Event()}
         self._newest_document = b"{}"  # for GET, made for the WebSockets anyway
         self._encoded: tuple[StreamUpdate | None, list[str]] = (None, [])  # once for all clients
-        self._bodies = BodyReader(MAX_BODY_BYTES, MAX_WEBSOCKETS * MAX_BODY_BYTES)
-        self.app = web.Application(middlewares=[guard.middleware])
+        self.app = web.Application(middlewares=[guard.middleware], client_max_size=MAX_BODY_BYTES)
         routes: list[web.AbstractRouteDef] = [
             web.get("/", self.get_page),
             web.static("/page", PAGE_FOLDER),
@@ -224,11 +223,11 @@ class LiveService:
         return await _answer(work)
 
     async def set_threshold(self, request: web.Request) -> web.Response:
-        """Set the threshold of a POST; a DELETE restores that of the model."""
+        """Set the threshold of a POST; at a DELETE, restore the threshold of the model."""
         value: float | None = None
         notice = "threshold of the model restored"
         if request.method == "POST":
-            value = (await self._bodies.read(request, _ThresholdRequest)).value
+            value = (await read_body(request, _ThresholdRequest)).value
             notice = f"threshold set to {value:.2f}"
         work = partial(self._session.stream.set_threshold, value)
         change = partial(self._session.change, work, "the threshold was not changed")
@@ -239,7 +238,7 @@ class LiveService:
 
     async def post_recording(self, request: web.Request) -> web.Response:
         """Begin to record."""
-        name = (await self._bodies.read(request, _FileRequest)).name
+        name = (await read_body(request, _FileRequest)).name
         return await _answer(lambda: {"path": str(self._recorder.start(name))})
 
     async def delete_recording(self, _: web.Request) -> web.Response:
@@ -248,7 +247,7 @@ class LiveService:
 
     async def post_marker(self, request: web.Request) -> web.Response:
         """Add a marker to the recording."""
-        text = (await self._bodies.read(request, _MarkerRequest)).text
+        text = (await read_body(request, _MarkerRequest)).text
         return await _answer(lambda: self._recorder.add_marker(text))
 
 

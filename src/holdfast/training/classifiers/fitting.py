@@ -130,7 +130,7 @@ def sigmoid(
 ) -> tuple[float, float]:
     """Fit a logistic function of the values to the classes; return its slope and offset.
 
-    The slope is above 0. If the fitted slope is not, the offset is that of the base rate. The fit
+    The slope is above 0. If the fitted slope is not, the offset follows from the base rate. The fit
     is scikit-learn's, which the SVM needs anyway: Newton's method goes on for longer, and would
     change the slope of every SVM by about 0.05 %.
     """

@@ -19,7 +19,7 @@ from holdfast.training.classifiers.fitting import (
 from holdfast.training.classifiers.newton import Solution, fit_logistic
 
 NONE, CALIBRATION, WEIGHTS = "none", "calibration", "weights"
-"""What is changed of the prior: nothing; intercept and slope of its log odds; or all weights."""
+"""Parts of the prior that are changed: none; intercept and slope of its log odds; all weights."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ class Adapted:
 
         Raises:
             TrainingError: the samples have only one class.
-            ValueError: the number of features is not that of the prior.
+            ValueError: the prior has another number of features.
         """
         del seed
         if samples.features.shape[1] != self.prior.n_features:

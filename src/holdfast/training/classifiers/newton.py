@@ -183,7 +183,7 @@ def _evaluate_multinomial(
 ) -> float:
     """Return the objective, and write its gradient and its Hessian (n_weights, n_weights).
 
-    The weights of a class are those of the features, then its intercept. Equal shifts of all
+    The weights of a class: one for each feature, then its intercept. Equal shifts of all
     intercepts change no probability: the square of the sum of the intercepts is added, which is
     0 at the minimum.
     """

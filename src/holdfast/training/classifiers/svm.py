@@ -124,8 +124,8 @@ def fit_svm(
     columns = np.vstack([features.T, np.ones(len(features))])
     columns *= np.where(positive, 1.0, -1.0)
     limits = c * np.where(positive, class_weights[1], class_weights[0])
-    one = np.ones(len(limits))
-    point = _Point(np.zeros(len(columns)), one, one, limits / 2)  # far from every bound
+    ones = np.ones(len(limits))
+    point = _Point(np.zeros(len(columns)), ones, ones, limits / 2)  # far from every bound
     for _ in range(MAX_STEPS):
         margins, supported = point.weights @ columns, columns @ point.multipliers
         # The dual objective is a lower bound, from any multipliers within their limits.
@@ -138,7 +138,7 @@ def fit_svm(
 
 
 class _System:
-    """Newton's equations at a point, reduced to those of the weights.
+    """Newton's equations at a point, reduced to the equations of the weights.
 
     Args:
         columns: (n_features + 1, n) vectors z_i.

@@ -173,7 +173,6 @@ class Service(PageService):
         self.refusal = None  # error of every REST call
         self.calls = []  # (method, path, text) of the REST calls
         self.recording = None
-        self.threshold = 0.5
         self.patch = {}  # fields that replace those of every message
         self.notices = []  # of the next message
         self.sockets = set()
@@ -202,8 +201,6 @@ class Service(PageService):
 
     async def act(self, request):
         begins, what = request.method == "POST", request.match_info["what"]
-        if what == "threshold":
-            self.threshold = (await request.json())["value"] if begins else 0.5
         if what != "recording":
             return web.json_response({})
         kept = self.recording
@@ -235,7 +232,7 @@ class Service(PageService):
     async def send(self):
         start, self.at = self.at, self.at + PERIOD * self.speed
         message = self.tape.message(start, self.at) | self.patch
-        message["thresholds"] = dict.fromkeys(self.tape.tracks, self.threshold)
+        message["thresholds"] = dict.fromkeys(self.tape.tracks, 0.5)
         message["notices"], self.notices = self.notices, []
         if self.recording:
             self.recording["seconds"] += PERIOD

@@ -107,31 +107,6 @@ def test_pause_look_back_and_go_on(visit, service, size):
 
 
 @on_both
-def test_move_a_threshold_and_restore_it(visit, service, size):
-    points = [
-        {"threshold": at, "false_alarms_per_minute": 4 * at, "missed": 2.0} for at in (0.5, 0.7)
-    ]
-    service.tape.hello_fields = {"operating_points": points}
-    page = opened(visit, service, size)
-    page.click("#threshold-toggle")
-    shows(page, "#threshold-expected", r"50\s%: 2.00 false alarms a minute, 2\s%")
-    assert page.locator("#threshold-own").is_disabled()
-    page.locator("#threshold").fill("0.8")
-    shows(page, "#threshold-expected", r"70\s%: 2.80 false alarms")
-    shows(page, "#threshold-now", r"69\s%")
-    until(page, "holdfast.plots.thresholds.index === 0.68997")
-    assert flaws(page, size) == []
-    page.click("#threshold-own")
-    shows(page, "#threshold-now", r"50\s%")
-    moved = ("POST", "threshold", '{"value":0.68997}')
-    assert service.calls == [moved, ("DELETE", "threshold", "")]
-    service.refusal = "the source has ended"
-    page.locator("#threshold").fill("5")
-    shows(page, ".toast.bad", "^the source has ended$")
-    until(page, "document.getElementById('threshold').value === '0'")
-
-
-@on_both
 def test_take_a_new_tare_record_mark_and_stop(visit, service, size):
     page = opened(visit, service, size)
     service.refusal = "the index is touched: <b>let go</b>"
@@ -224,7 +199,7 @@ def test_change_between_light_and_dark(visit, service, size):
 def test_do_everything_with_the_keyboard(visit, service):
     page = opened(visit, service)
     page.keyboard.press("?")
-    shows(page, "#help-box", r"builtin:twin[\s\S]*twin:\?object=can[\s\S]*thumb \(30\)")
+    shows(page, "#help-box", r"pause plots and maps[\s\S]*What the page shows")
     page.keyboard.press("r")  # keys do nothing behind the help
     page.keyboard.press("Escape")
     assert page.locator("#help-box").is_hidden()
@@ -237,8 +212,6 @@ def test_do_everything_with_the_keyboard(visit, service):
     shows(page, "#paused", "PAUSED")
     page.keyboard.press("k")
     assert page.locator("#paused").is_hidden()
-    page.keyboard.press("p")
-    assert page.locator("#threshold-panel").is_visible()
     for key in "trm":
         n = len(service.calls)
         page.keyboard.press(key)
@@ -294,7 +267,7 @@ def test_see_what_an_odd_device_sends(visit):
         service.notices = [{"time": 1e9, "text": HOSTILE}]
         service.tape.change = {HOSTILE: {"faults": [HOSTILE], "reason": HOSTILE, "state": HOSTILE}}
         page.keyboard.press("?")
-        for selector in (".name", "#fingers", "#notices", ".faults", "#stream"):
+        for selector in (".name", "#fingers", "#notices", ".faults"):
             shows(page, selector, re.escape(HOSTILE))
         assert page.locator("img").count() == 0
         service.tape.change = {"thumb": {"taxels": [[1, 2, 3]], "faulty_taxels": [99]}}

@@ -48,7 +48,7 @@ def server_addresses(address: Address) -> tuple[ServerAddress, ...]:
     if host != AUTO_HOST:
         return (ServerAddress(host, port),)
     hosts = dict.fromkeys((HOST, own_address()))
-    return tuple(ServerAddress(one, port) for one in hosts if one)
+    return tuple(ServerAddress(name, port) for name in hosts if name)
 
 
 def own_address() -> str | None:

@@ -89,9 +89,9 @@ class XelaSource(DeviceSource):
         text = b""
         while not text and (left := deadline - time.monotonic()) > 0:
             try:
-                given = self._connection.recv(left, decode=False)
+                message = self._connection.recv(left, decode=False)
                 received = time.monotonic()
-                text = given if self._decoder.identify(given) else b""
+                text = message if self._decoder.identify(message) else b""
             except InvalidPacket as why:
                 invalid = why  # the next one may be valid: the first may have been cut
             except TimeoutError:

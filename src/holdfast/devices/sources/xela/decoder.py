@@ -80,7 +80,7 @@ class XelaDecoder:
             return False
         if not packet.sensors:
             raise InvalidPacket("it has no sensors")
-        found: dict[int, tuple[str, int]] = {}
+        models: dict[int, tuple[str, int]] = {}
         for number, raw in packet.sensors.items():
             try:
                 part = read_sensor(raw, calibrated=self._calibrated)
@@ -88,11 +88,11 @@ class XelaDecoder:
                 # Valid, but without newtons: another packet will not have them either.
                 if readings is None and self._calibrated:
                     raise SourceError(no_calibration(number, part.model))
-                found[number] = part.model, len(_checked(part.taxels, readings))
+                models[number] = part.model, len(_checked(part.taxels, readings))
             except InvalidPacket as why:
                 raise InvalidPacket(f"sensor {number}: {why}") from why
         self._assembler.devices = xela_devices(
-            found, self._names, self._sensor, calibrated=self._calibrated
+            models, self._names, self._sensor, calibrated=self._calibrated
         )
         self.version = packet.version
         return True

@@ -12,27 +12,27 @@ from holdfast.sensors.xela_models import is_known, module_sensors, whole_hand
 
 
 def xela_devices(
-    found: Mapping[int, tuple[str, int]],
+    models: Mapping[int, tuple[str, int]],
     names: Mapping[int, str],
-    given: Sensor | None = None,
+    stated: Sensor | None = None,
     *,
     calibrated: bool = False,
 ) -> dict[int, Device]:
     """Return the sensors of a server by number, with their modules.
 
     Args:
-        found: model and number of taxels, by the server's number.
+        models: model and number of taxels, by the server's number.
         names: names of separate sensors, by number; `finger1`, ... for the others.
-        given: layout of the separate sensors with this number of taxels, for any model.
+        stated: layout of the separate sensors with this number of taxels, for any model.
         calibrated: whether readings are in newtons.
 
     Raises:
-        SourceError: a model has another number of taxels, `names` or `given` fits no sensor, or
+        SourceError: a model has another number of taxels, `names` or `stated` fits no sensor, or
             two modules have the same name.
     """
-    hands = {number: whole for number, (model, _) in found.items() if (whole := whole_hand(model))}
+    hands = {number: whole for number, (model, _) in models.items() if (whole := whole_hand(model))}
     devices = {}
-    for number, (model, n_taxels) in found.items():
+    for number, (model, n_taxels) in models.items():
         if number in hands:
             # Two hands have the same names of modules; one hand has them without a prefix.
             prefix = f"hand{number}/" if len(hands) > 1 else ""
@@ -42,27 +42,27 @@ def xela_devices(
             device = Device(number, model, prefixed, order)
         else:
             name = names.get(number, f"finger{number}")
-            device = _separate(number, name, model, n_taxels, given)
+            device = _separate(number, name, model, n_taxels, stated)
         if calibrated:  # the range is that of counts
             units = {n: replace(m, unit="N", range=None) for n, m in device.modules.items()}
             device = replace(device, modules=units)
         devices[number] = device
-    _check(devices, names, given)
+    _check(devices, names, stated)
     return devices
 
 
-def _separate(number: int, name: str, model: str, n_taxels: int, given: Sensor | None) -> Device:
-    if given is not None and given.n_taxels == n_taxels:
-        return Device(number, model, {name: given})
-    (found,) = _built_in(number, model, n_taxels).values()
+def _separate(number: int, name: str, model: str, n_taxels: int, stated: Sensor | None) -> Device:
+    if stated is not None and stated.n_taxels == n_taxels:
+        return Device(number, model, {name: stated})
+    (device,) = _built_in(number, model, n_taxels).values()
     if is_known(model):
-        return Device(number, model, {name: found})
-    layout = "a flat grid" if found.name == (model.lower() or "unknown") else found.name
+        return Device(number, model, {name: device})
+    layout = "a flat grid" if device.name == (model.lower() or "unknown") else device.name
     notice = (
         f"{name}: the layout of a {model or 'sensor without a model'} with {n_taxels} taxels is "
         f"not known; {layout} is assumed (sensor=FILE.json in the URI gives another)"
     )
-    return Device(number, model, {name: found}, notices=(notice,))
+    return Device(number, model, {name: device}, notices=(notice,))
 
 
 def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
@@ -74,7 +74,7 @@ def _built_in(number: int, model: str, n_taxels: int) -> dict[str, Sensor]:
         ) from cause
 
 
-def _check(devices: Mapping[int, Device], names: Mapping[int, str], given: Sensor | None) -> None:
+def _check(devices: Mapping[int, Device], names: Mapping[int, str], stated: Sensor | None) -> None:
     # The modules of a whole hand have fixed names and layouts.
     separate = [device for device in devices.values() if device.order is None]
     present = ", ".join(f"{device.number} ({device.model})" for device in devices.values())
@@ -83,10 +83,10 @@ def _check(devices: Mapping[int, Device], names: Mapping[int, str], given: Senso
             f"fingers= names {', '.join(map(str, unknown))}; separate sensors have names, "
             f"the server has {present}"
         )
-    if given is not None and all(given.n_taxels != device.n_taxels for device in separate):
+    if stated is not None and all(stated.n_taxels != device.n_taxels for device in separate):
         sizes = (f"{device.number} ({device.n_taxels} taxels)" for device in devices.values())
         raise SourceError(
-            f"sensor= has {given.n_taxels} taxels and fits no sensor of the server: "
+            f"sensor= has {stated.n_taxels} taxels and fits no sensor of the server: "
             + ", ".join(sizes)
         )
     modules = [name for device in devices.values() for name in device.modules]

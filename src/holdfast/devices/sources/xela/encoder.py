@@ -140,8 +140,8 @@ class XelaEncoder:
         for number, (part, constant) in enumerate(zip(self._parts, self._constant, strict=True), 1):
             readings = part.readings(samples)
             if readings is not None:  # a server leaves out a sensor without a sample
-                own = time if times is None or self.is_hand else times[part.names[0]]
-                sensors[str(number)] = self._sensor(number, part, *readings, constant, own)
+                stamp = time if times is None or self.is_hand else times[part.names[0]]
+                sensors[str(number)] = self._sensor(number, part, *readings, constant, stamp)
         top: dict[str, Any] = {"message": self._counter, "time": time, "sensors": len(sensors)}
         self._counter = (self._counter + 1) % SEQUENCE_PERIOD
         if self._version == OLD_VERSION:
@@ -169,14 +169,14 @@ class XelaEncoder:
                 "model": part.model,
                 "calibrated": calibrated,
             }
-        known = {} if calibrated is None else {"calibrated": calibrated}
+        newton_fields = {} if calibrated is None else {"calibrated": calibrated}
         return {
             "time": time,
             "sensor": str(number),
             "data": data,
             "model": part.model,
             "taxels": len(counts),
-            **known,
+            **newton_fields,
             "integer": flat.tolist(),
             **constant,
         }
@@ -294,42 +294,42 @@ class _WholeHand:
 
     def readings(self, samples: ModuleSamples) -> _Readings | None:
         """Return the readings, or None without a sample."""
-        found = {name: sample for name, sample in samples.items() if name in self._indices}
-        read = {name: _readings(name, self._sensors[name], one) for name, one in found.items()}
+        used = {name: sample for name, sample in samples.items() if name in self._indices}
+        read = {name: _readings(name, self._sensors[name], x) for name, x in used.items()}
         # Taxels of modules that the source lacks move by their noise, as real ones do: constant
         # readings would be the fault `stuck`.
         counts = self._rest[self._n_packets % N_REST_SAMPLES].copy()
         counts[self._present] = self._counts[self._present]
         self._n_packets += 1
-        for name, one in read.items():
-            if one is not None:
-                counts[self._indices[name]] = one[0]
-                self._newtons[self._indices[name]] = 0.0 if one[1] is None else one[1]
+        for name, x in read.items():
+            if x is not None:
+                counts[self._indices[name]] = x[0]
+                self._newtons[self._indices[name]] = 0.0 if x[1] is None else x[1]
         self._counts = counts
         return (counts, self._newtons if self._calibrated else None) if any(read.values()) else None
 
 
-def _readings(name: str, sensor: Sensor, given: npt.NDArray[Any]) -> _Readings | None:
+def _readings(name: str, sensor: Sensor, sample: npt.NDArray[Any]) -> _Readings | None:
     """Return the readings of a module; None if a count is not finite."""
-    if given.shape != (sensor.n_taxels, 3):
-        raise ValueError(f"{name}: {(sensor.n_taxels, 3)} readings expected, {given.shape} given")
+    if sample.shape != (sensor.n_taxels, 3):
+        raise ValueError(f"{name}: {(sensor.n_taxels, 3)} readings expected, {sample.shape} given")
     if sensor.unit == "N":
         counts = np.nan_to_num(
-            REST_READING + given / NEWTONS_PER_TAXEL_COUNT, nan=float(REST_READING[0])
+            REST_READING + sample / NEWTONS_PER_TAXEL_COUNT, nan=float(REST_READING[0])
         )
-        return np.rint(np.clip(counts, 0, 65535)).astype(np.uint16), given.astype(np.float64)
-    if given.dtype == np.uint16:
-        return given.astype(np.uint16), None
-    if not np.isfinite(given).all():
+        return np.rint(np.clip(counts, 0, 65535)).astype(np.uint16), sample.astype(np.float64)
+    if sample.dtype == np.uint16:
+        return sample.astype(np.uint16), None
+    if not np.isfinite(sample).all():
         return None
     # Limits by half a count: what rounds to a uint16 is one.
-    low, high = given.min(), given.max()
+    low, high = sample.min(), sample.max()
     if not (low > -0.5 and high < 65535.5):
         raise ValueError(
             f"{name}: readings from 0 to 65535 counts expected, {low:.6g} to {high:.6g} given; "
             "packets of a XELA server hold no others"
         )
-    return np.rint(given).astype(np.uint16), None
+    return np.rint(sample).astype(np.uint16), None
 
 
 def is_part_of_hand(sensors: Mapping[str, Sensor]) -> bool:

@@ -79,8 +79,8 @@ def read(path: Path) -> Iterator[Recording]:
     }
     counts = {"n_lost": n_lost, "n_refused": n_refused}
     # Zero is left out: metadata of a log without losses say nothing about them.
-    found = {name: count for name, count in counts.items() if count}
-    yield Recording(path.stem, modules, {"source": path.name, **decoder.metadata, **found})
+    counted = {name: count for name, count in counts.items() if count}
+    yield Recording(path.stem, modules, {"source": path.name, **decoder.metadata, **counted})
 
 
 def _files(path: Path) -> list[Path]:

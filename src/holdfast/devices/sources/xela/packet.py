@@ -120,14 +120,14 @@ def read_packet(text: str | bytes) -> Packet | None:
         7
     """
     try:
-        given = text.encode() if isinstance(text, str) else text
+        data = text.encode() if isinstance(text, str) else text
         try:
-            fields = _PACKET.decode(given)
+            fields = _PACKET.decode(data)
         except msgspec.DecodeError:
             # Tried after the plain form, which nearly all packets have.
-            if not _NOT_A_NUMBER.search(given):
+            if not _NOT_A_NUMBER.search(data):
                 raise
-            fields = _PACKET.decode(_NOT_A_NUMBER.sub(b"null", given))
+            fields = _PACKET.decode(_NOT_A_NUMBER.sub(b"null", data))
     except (ValueError, RecursionError) as cause:
         raise InvalidPacket(str(cause)[:MAX_REASON_LENGTH]) from cause
     sensors = {
@@ -146,8 +146,8 @@ def read_packet(text: str | bytes) -> Packet | None:
     time = _value(fields, "time")
     version = _value(fields, "version")
     ordered = dict(sorted(sensors.items()))
-    known = version[:MAX_MODEL_NAME_LENGTH] if isinstance(version, str) else ""
-    return Packet(counter, _stamp(time), known, ordered)
+    version_text = version[:MAX_MODEL_NAME_LENGTH] if isinstance(version, str) else ""
+    return Packet(counter, _stamp(time), version_text, ordered)
 
 
 def read_sensor(raw: msgspec.Raw, *, calibrated: bool) -> Counts | Calibrated:

@@ -2,7 +2,7 @@
 
 import { byId, make, setShape, setText } from "../web/dom.js";
 import { NO_VALUE, stateKey } from "../web/text.js";
-import { delay, isLate, latency, stateWord } from "./format.js";
+import { isLate, latency, stateWord } from "./format.js";
 
 const ANNOUNCE_INTERVAL = 1500; // [ms]; a screen reader cannot follow 20 announcements a second
 const PARTS = {
@@ -56,7 +56,7 @@ export class HealthLine {
     };
     show("rate", (health.rate ?? null) === null ? NO_VALUE : `${health.rate.toFixed(1)} Hz`, false);
     for (const key of ["p50", "p99", "max"]) show(key, latency(health.latency?.[key]), false);
-    show("delay", delay(health.delay), true);
+    show("delay", latency(health.delay), true);
     // Shown while it matters alone: the foot has one line on a tablet.
     this.values.delay.parentElement.hidden = !isLate(health.delay);
     for (const key of ["n_packets", "n_lost", "n_refused", "n_dropped"]) show(key, whole(health[key]), key !== "n_packets" && health[key] > 0);

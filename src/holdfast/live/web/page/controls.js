@@ -1,4 +1,4 @@
-// Buttons for tare, recording, markers and full screen. The page disables them without a connection.
+// Buttons for tare, recording and markers. The page disables them without a connection.
 
 import { callService } from "../web/connection.js";
 import { byId, runOnce, setText, showToast } from "../web/dom.js";
@@ -17,7 +17,6 @@ export class Controls {
     byId("tare").addEventListener("click", () => this.tare());
     byId("record").addEventListener("click", () => this.record());
     byId("marker").addEventListener("submit", (event) => { event.preventDefault(); this.mark(); });
-    byId("full").addEventListener("click", () => this.toggleFullScreen());
   }
 
   start({ can_record: canRecord }) {
@@ -72,10 +71,5 @@ export class Controls {
         delete document.body.dataset.flash;
       }
     });
-  }
-
-  toggleFullScreen() {
-    const done = document.fullscreenElement ? document.exitFullscreen() : document.documentElement.requestFullscreen();
-    done.catch(() => showToast("The browser does not allow full screen here", "bad"));
   }
 }

@@ -17,8 +17,6 @@ const REASONS = {
 
 /** Return whether samples arrive late enough to be worth a colour; as MIN_LATE_DELAY [s]. */
 export const isLate = (seconds) => seconds > 0.1;
-/** Format how late samples arrive [s]: "0 ms", "340 ms". */
-export const delay = (seconds) => (Number.isFinite(seconds) ? `${(1000 * seconds).toFixed(0)}\u202fms` : NO_VALUE);
 
 export const stateWord = (state) => withSpaces(state ?? "UNKNOWN");
 export const reasonWord = (reason) => (reason ? REASONS[reason] ?? withSpaces(reason) : "");

@@ -12,7 +12,6 @@ import { STATES, hasSlipRule } from "./format.js";
 import { EventLog, NoticeLog } from "./logs.js";
 import { Plots } from "./plots.js";
 import { SampleStore, capacityFor } from "./store.js";
-import { ThresholdPanel } from "./threshold.js";
 
 const WINDOWS = [5, 10, 30, 60]; // [s]
 const MAX_DRAW_TIME = 1000; // [ms]; a longer time means that the tab was hidden
@@ -26,7 +25,6 @@ class Page {
     this.plots = new Plots(byId("stack"));
     this.cards = new Cards(byId("cards"), (name) => this.chooseFinger(this.plots.chosen === name ? null : name));
     this.controls = new Controls((text) => this.addMarker(text));
-    this.threshold = new ThresholdPanel();
     this.advised = new Set(); // advice that the list of notices has
     this.status = { link: "connecting", reason: "", ended: false, silent: false, problem: "" };
     this.store = null;
@@ -54,11 +52,9 @@ class Page {
       ["1 – 9", "show the plots of this finger", Object.fromEntries(fingers)],
       ["0", "show the plots of all fingers", { 0: () => this.chooseFinger(null) }],
       ["T", "take a new tare", { t: () => controls.tare() }],
-      ["P", "show or hide the threshold", { p: () => this.threshold.toggle() }],
       ["R", "start or stop a recording", { r: () => controls.record() }],
       ["M", "add a marker with the text of the field", { m: () => controls.mark() }],
       ["L", "light up the page for a camera, and mark when", { l: () => controls.flash() }],
-      ["F", "full screen", { f: () => controls.toggleFullScreen() }],
     ];
   }
 
@@ -69,11 +65,10 @@ class Page {
     this.restarts = hello.source.startsWith("twin:"); // it pauses between two grasps
     this.maxGap = hello.rate ? Math.max(0.1, 4 / hello.rate) : 0.5;
     this.events.clear();
-    for (const part of [this.banner, this.cards, this.controls, this.threshold]) part.start(hello);
+    for (const part of [this.banner, this.cards, this.controls]) part.start(hello);
     this.plots.start(hello, this.store);
     document.body.classList.toggle("has-slips", Object.values(hello.fingers).some(hasSlipRule));
     this.fillFingers();
-    this.showStream(hello);
     for (const text of (hello.advice ?? []).filter((advice) => !this.advised.has(advice))) {
       this.advised.add(text);
       this.notices.add({ time: Date.now() / 1000, text });
@@ -85,7 +80,6 @@ class Page {
     const problem = (message.problems ?? []).map(({ text }) => text).join(" · ");
     Object.assign(this.status, { ended: Boolean(message.ended), silent: Boolean(message.health?.silent), problem });
     this.plots.thresholds = message.thresholds ?? {};
-    this.threshold.update(message.thresholds);
     this.now = message.time;
     this.store.append(message.series, Math.max(0, STATES.indexOf(message.hand)), this.maxGap);
     // An old STABLE must not look like a current one.
@@ -106,7 +100,7 @@ class Page {
     // The reason of a refusal stays visible during further attempts.
     if (link === "lost" && this.status.link === "refused") return;
     Object.assign(this.status, { link, reason });
-    for (const id of ["actions", "threshold-panel"]) byId(id).disabled = link !== "open";
+    byId("actions").disabled = link !== "open";
     this.showLink();
     if (link === "open") return;
     this.banner.showState("UNKNOWN", "NO CONNECTION");
@@ -185,15 +179,6 @@ class Page {
     if (!Number.isFinite(this.now)) return;
     this.plots.addMarker(this.now);
     this.events.addEvent("marker", text);
-  }
-
-  showStream(hello) {
-    const rows = {
-      model: hello.model, source: hello.source, rate: hello.rate ? `${hello.rate} Hz` : "not known",
-      sensors: [...new Set(Object.values(hello.fingers).map(({ sensor }) => sensor))].join(", "),
-      "modules (taxels)": Object.entries(hello.modules ?? {}).map(([name, n]) => `${name} (${n})`).join(", "),
-    };
-    byId("stream").replaceChildren(...Object.entries(rows).flatMap(([name, value]) => [make("dt", "", name), make("dd", "", String(value))]));
   }
 }
 
