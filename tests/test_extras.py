@@ -85,6 +85,9 @@ MISSING = {
     ],
     "plot": [["info", "grasp.mcap", "--plot", "a.png"], ["sensors", "anyskin", "--plot", "a.png"]],
     "serial": [["detect", "builtin:any", "serial:///dev/ttyACM0?sensor=anyskin"]],
+    "cluster": [
+        ["import", "log.csv", "others", "--sensor", "anyskin", "--engine", "dask:tcp://a:1"]
+    ],
 }
 """Commands that name an extra, and exit with 2."""
 

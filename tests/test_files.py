@@ -41,6 +41,13 @@ def test_existing_output_is_kept(tmp_path):
     assert target.read_text() == "old"
 
 
+def test_a_device_or_a_pipe_is_not_replaced(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OutputError, match="pipe; a file"):
+        write_whole(tmp_path / "pipe", b"", force=True)
+    assert (tmp_path / "pipe").is_fifo()
+
+
 def test_missing_folder(tmp_path):
     target = tmp_path / "no" / "a.json"
     with pytest.raises(OutputError, match="no does not exist"):

@@ -6,7 +6,7 @@
     ├── TrainingError    the data cannot train or test a classifier (one class, one group)
     ├── StreamError      a detector cannot process the samples
     ├── SourceError      a source cannot be reached, sends nothing, or is not the expected one
-    ├── EngineError      the processes that make parallel calls fail
+    ├── EngineError      the processes or the cluster that make parallel calls fail
     ├── OutputError      an output exists already or cannot be written
     └── MissingExtra     an optional package is not installed
 
@@ -33,6 +33,7 @@ EXTRA_MODULES = {
     "plot": ("matplotlib",),
     "label": ("scipy",),
     "video": ("cv2", "scipy"),
+    "cluster": ("dask", "distributed", "threadpoolctl"),
     "serial": ("serial",),
     "hdf5": ("h5py",),
 }
@@ -46,6 +47,7 @@ EXTRA_PURPOSES = {
     "plot": "figures, --plot",
     "label": "holdfast label",
     "video": "holdfast label markers, record --camera, and stickers in videos",
+    "cluster": "a Dask cluster, --engine dask:ADDRESS",
     "ros": "topics of ROS without a ROS 2 installation, and bags",
     "serial": "sensors on a serial port",
     "hdf5": "import of HDF5 recordings",
@@ -112,7 +114,7 @@ class SourceError(HoldfastError):
 
 
 class EngineError(HoldfastError):
-    """The processes of parallel calls fail: repair what ended them, then start again."""
+    """The processes or the cluster of parallel calls fail: repair them, then start again."""
 
 
 class OutputError(HoldfastError):

@@ -100,9 +100,12 @@ def refuse_overwrite(path: str | Path, *, force: bool = False) -> None:
     """Raise an error if `path` must not be written.
 
     Raises:
-        OutputError: `path` exists and `force` is not given, or its folder does not exist.
+        OutputError: `path` exists and `force` is not given, or is a device or a pipe; or its folder
+            does not exist.
     """
     target = Path(path)
+    if target.exists() and not target.is_file() and not target.is_dir():
+        raise OutputError(f"{target} is a device or a pipe; a file or a new name expected")
     if target.exists() and not force:
         raise OutputError(f"{target} exists already: choose another name, or give --force")
     if not target.parent.is_dir():

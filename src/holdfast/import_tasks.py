@@ -102,12 +102,13 @@ def import_all(
 
     Raises:
         RecordingError: the input cannot be read, or two recordings have the same name.
-        OutputError: a recording exists already, or cannot be written.
+        OutputError: a recording exists already, or cannot be written, or a worker does not share
+            the folder.
     """
     out = task.out
     if out.exists() and not out.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, "is a file; a folder expected", str(out))
-    prefixes, task = _parts(path, task)
+    prefixes, task = _parts(engine.path(path), replace(task, out=engine.path(out)))
     with _staging_folder(task.out) as folder:
         calls = engine.map_ordered(_import_part, prefixes.items(), shared=(task, folder))
         imported: list[Imported] = []
@@ -119,6 +120,7 @@ def import_all(
                     notify(text)
             printed |= messages.keys()
             for recording in recordings:
+                engine.check_written(folder / recording.file_name)
                 # Parts are imported in different processes: only here are all names known.
                 if recording.file_name in names:
                     raise RecordingError(SAME_NAME.format(recording.document["name"]))
@@ -127,6 +129,9 @@ def import_all(
         # All parts were read without an error: only now do the recordings get their names.
         for recording in imported:
             (folder / recording.file_name).replace(task.out / recording.file_name)
+    # The path as the user gave it; that of the task is absolute on a cluster.
+    for recording in imported:
+        recording.document["path"] = out / recording.file_name
     hint = None if task.data_format is None else import_hint(task.data_format)
     return ImportResult(imported, out, hint)
 

@@ -1,4 +1,4 @@
-"""Parallel calls, in processes of this machine by joblib.
+"""Parallel calls: in processes of this machine by joblib, or on a Dask cluster.
 
 Results do not depend on where or in which order the calls are made.
 """
@@ -7,34 +7,86 @@ import os
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from functools import cache, partial
+from pathlib import Path
 from threading import Thread
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple, Self, TypeVar
 
-from holdfast.errors import EngineError, MissingExtra, is_installed
+from holdfast.cluster import Arguments, Call, call_on_cluster
+from holdfast.errors import EngineError, MissingExtra, OutputError, is_installed
 
 T = TypeVar("T")
 K = TypeVar("K", bound=Hashable)
-Arguments = tuple[object, ...]
-Call = tuple[K, Arguments]
 
 PARENT_CHECK_INTERVAL = 1.0
 """Time between two checks of a process whether the process that started it still runs [s]."""
 
 
 class Engine(NamedTuple):
-    """Where calls are made: in this process, or in processes of this machine.
+    """Where calls are made: this process, processes of this machine, or a Dask cluster.
 
     Attributes:
         n_jobs: number of calls at a time; -1 for one per processor. With 1, all calls are made
-            in this process.
+            in this process. On a cluster, its number of threads counts instead.
+        scheduler: address of a Dask scheduler; None for this machine.
     """
 
     n_jobs: int = 1
+    scheduler: str | None = None
+
+    @classmethod
+    def parse(cls, text: str = "loky", n_jobs: int = -1) -> Self:
+        """Return the engine that a text names.
+
+        Args:
+            text: `loky` for processes of this machine, `dask:ADDRESS` for a cluster.
+            n_jobs: number of calls at a time on this machine.
+
+        Raises:
+            ValueError: the text names no engine.
+
+        Example:
+            >>> Engine.parse("dask:tcp://10.0.0.1:8786").scheduler
+            'tcp://10.0.0.1:8786'
+        """
+        kind, _, address = text.partition(":")
+        if text == "loky":
+            return cls(n_jobs)
+        if kind == "dask" and address:
+            return cls(n_jobs, address)
+        raise ValueError(f"unknown engine {text!r}; there are loky and dask:ADDRESS")
 
     @property
     def in_this_process(self) -> bool:
         """Whether a call is made in this process, when its result is needed."""
-        return self.n_jobs == 1
+        return self.scheduler is None and self.n_jobs == 1
+
+    def path(self, path: Path) -> Path:
+        """Return a path as all processes can use it: absolute on a cluster.
+
+        A worker has another working folder. Its machine must have the file at the same path.
+        """
+        return path if self.scheduler is None else path.absolute()
+
+    def check_written(self, path: Path) -> None:
+        """Check that a file that a call has written is there.
+
+        Raises:
+            OutputError: a worker of a cluster wrote it to a disk of its own.
+        """
+        if self.scheduler is not None and not path.exists():
+            raise OutputError(
+                f"a worker wrote {path.absolute()}, but it is not on this machine: choose a folder "
+                "that all machines have at the same path"
+            )
+
+    def check(self) -> None:
+        """Make one call, so that an engine that cannot be reached is found before the work.
+
+        Raises:
+            EngineError, MissingExtra: as `map_unordered`.
+        """
+        if self.scheduler is not None:
+            list(self.map_ordered(abs, [(0,)]))
 
     def map_ordered(
         self,
@@ -71,18 +123,21 @@ class Engine(NamedTuple):
         Args:
             function: any function that can be sent to another process.
             calls: the name of each call and its arguments. All names differ.
-            shared: first arguments of every call.
+            shared: first arguments of every call. A cluster copies them to each worker once.
 
         Yields:
             The name of a call and its result.
 
         Raises:
-            EngineError: a process died.
-            MissingExtra: joblib is not installed.
+            EngineError: the cluster cannot be reached, has no workers or a worker without this
+                version of holdfast, or a process died.
+            MissingExtra: joblib or dask is not installed.
         """
+        if self.scheduler is not None:
+            return call_on_cluster(function, calls, self.scheduler, shared)
         if shared:
             function = partial(function, *shared)
-        if not self.in_this_process:
+        if self.n_jobs != 1:
             return _in_processes(function, calls, self.n_jobs)
         return ((name, function(*arguments)) for name, arguments in calls)
 

@@ -42,7 +42,6 @@ REMOVED: dict[str, dict[str, str]] = {
         "train --resume": "leave it out: train has a grid now, and holdfast study the search",
         "datasets --yes": "leave it out, no set is larger than 26 MB",
         "--config": WRITTEN_OUT,
-        "--engine": "--jobs N, for N processes of this machine",
         "play --hand": "holdfast hold twin:?object=can --hand twin:",
         **dict.fromkeys(
             (

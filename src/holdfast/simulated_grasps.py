@@ -3,7 +3,7 @@
 The same call continues a run that was stopped, as recordings that exist are kept.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -133,10 +133,18 @@ def simulate_all(
     """
     if len(missing) < n_wanted:
         notify(f"{n_wanted - len(missing)} of {n_wanted} recordings exist already")
-    if len(missing) == 1:
-        engine = Engine(1)  # one task needs no other process
-    done = engine.map_ordered(simulate_one, ((task, out, force) for task in missing))
-    return [name for names in steps(done, "simulating", len(missing)) for name in names]
+    if len(missing) == 1 and engine.scheduler is None:
+        engine = engine._replace(n_jobs=1)  # one task needs no other process
+    tasks = ((task, engine.path(out), force) for task in missing)
+
+    def checked() -> Iterator[list[str]]:
+        for names in engine.map_ordered(simulate_one, tasks):
+            # At the first result: a cluster that writes to other disks is found early.
+            engine.check_written(path_of(names[-1], out))
+            yield names
+
+    finished = steps(checked(), "simulating", len(missing))
+    return [name for names in finished for name in names]
 
 
 def simulate_grasp(grasp: Grasp, out: Path, force: bool) -> list[str]:
@@ -217,7 +225,7 @@ def film_all(
         force: overwrite videos.
         steps: shows the progress.
     """
-    paths = [path_of(grasp.name, out) for grasp in grasps]
+    paths = [engine.path(path_of(grasp.name, out)) for grasp in grasps]
     missing = [path for path in paths if path.exists() and (force or not _video_of(path).exists())]
     done = engine.map_ordered(film_recording, ((path, fps, force) for path in missing))
     for _ in steps(done, "filming", len(missing)):

@@ -1,10 +1,10 @@
-"""The verbs that take `--jobs` give the same files by several processes."""
+"""The verbs that take `--engine` give the same files on a cluster, and refuse a wrong address."""
 
 import msgspec
 import pytest
-from joblib.externals.loky import get_reusable_executor
 
 from command_line import Verb
+from holdfast import cluster as cluster_module
 from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 from holdfast.twin import simulation
@@ -16,10 +16,20 @@ SHORT = msgspec.structs.replace(profile("reference"), idle=(0.2, 0.3), hold=1.0)
 HEADER = "# sensor: anyskin\ntime," + ",".join(f"t{n:02d}_{a}" for n in range(1, 6) for a in "xyz")
 
 
+@pytest.fixture(scope="module")
+def cluster():
+    """The address of a cluster of two threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+        dashboard_address="127.0.0.1:0", silence_logs=50,
+    ) as running:  # fmt: skip
+        yield running.scheduler_address
+
+
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     """A working folder with recordings and a folder to import."""
-    get_reusable_executor().shutdown()  # its processes are in the folder of an earlier test
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(simulation, "profile", lambda name: SHORT)
     for name in ("data", "in"):
@@ -39,28 +49,42 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_simulate(capsys, folder):
+def test_simulate(capsys, cluster, folder):
     words = ("--objects", "flask", "--cases", 1, "--repeats", 1)
     alone = run(capsys, "simulate", "alone", *words, "--jobs", 1)
-    there = run(capsys, "simulate", "there", *words, "--jobs", 2)
+    there = run(capsys, "simulate", "there", *words, "--engine", f"dask:{cluster}")
     assert there["recordings"] == alone["recordings"]
     assert contents(folder / "there") == contents(folder / "alone")
 
 
-def test_import(capsys, folder):
+def test_import(capsys, cluster, folder):
     alone = run(capsys, "import", "in", "alone")
-    there = run(capsys, "import", "in", "there", "--jobs", 2)
+    there = run(capsys, "import", "in", "there", "--engine", f"dask:{cluster}")
     assert [each["name"] for each in there["recordings"]] == ["a", "b"]
     assert there["recordings"][0]["path"] == "there/a.parquet"
     assert there["n_samples"] == alone["n_samples"] == 80
     assert contents(folder / "there") == contents(folder / "alone")
 
 
-def test_train_and_evaluate(capsys, folder):
+def test_train_and_evaluate(capsys, cluster, folder):
     words = ("train", "data", "--trials", 0)
     alone = run(capsys, *words, "-o", "alone.json")
-    there = run(capsys, *words, "-o", "there.json", "--jobs", 2)
+    there = run(capsys, *words, "-o", "there.json", "--engine", f"dask:{cluster}")
     assert (folder / "there.json").read_bytes() == (folder / "alone.json").read_bytes()
     assert there["cross_validation"] == alone["cross_validation"]
     words = ("evaluate", "there.json", "data")
-    assert run(capsys, *words, "--jobs", 2) == run(capsys, *words)
+    assert run(capsys, *words, "--engine", f"dask:{cluster}") == run(capsys, *words)
+
+
+def test_no_scheduler_at_the_address(capsys, monkeypatch, folder):
+    monkeypatch.setattr(cluster_module, "SCHEDULER_TIMEOUT", 0.5)
+    words = ("train", "data", "-o", "model.json", "--engine", "dask:tcp://127.0.0.1:1")
+    assert "tcp://127.0.0.1:1" in Verb().refusal(capsys, *words)
+    assert not (folder / "model.json").exists()
+
+
+def test_a_folder_that_the_workers_do_not_share(capsys, cluster, monkeypatch):
+    name = "holdfast.simulated_grasps.simulate_grasp"
+    monkeypatch.setattr(name, lambda grasp, out, force: [grasp.name])
+    words = ("--objects", "flask", "--cases", "1", "--repeats", "1", "--engine", f"dask:{cluster}")
+    assert "flask-case1-1.parquet" in Verb("simulate").refusal(capsys, "there", *words)

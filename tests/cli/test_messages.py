@@ -84,6 +84,7 @@ MESSAGES = [
     ("import a.parquet kept/deeper", "kept/deeper"),
     ("import press.csv out --columns F", "--columns", "time=COLUMN"),
     ("import a.parquet out --jobs 0", "jobs", "0 given"),
+    ("import a.parquet out --engine spark:x", "'spark:x'", "loky", "dask"),
     ("info none", "none does not exist"),
     ("info nothing", "nothing is empty", "holdfast import"),
     ("info other", "no recording in other (1 other", "holdfast import"),

@@ -18,7 +18,17 @@ from .build import tiny_recording
 pytestmark = pytest.mark.slow
 
 QUICK = Setting(trials=0)
-PROCESSES = Engine(2)
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """An engine on a cluster of two threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", host="127.0.0.1",
+        dashboard_address="127.0.0.1:0", silence_logs=50,
+    ) as running:  # fmt: skip
+        yield Engine.parse(f"dask:{running.scheduler_address}")
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +61,13 @@ def assert_same(one, other):
 
 
 @pytest.mark.parametrize("max_samples", [200_000, 100, 7])
-def test_samples_do_not_depend_on_the_engine(folder, max_samples):
+def test_samples_do_not_depend_on_the_engine(folder, cluster, max_samples):
     recordings = load_dataset(folder)
     setting = replace(QUICK, max_samples=max_samples)
     scan = scan_dataset(recordings)
     plan = SamplesPlan(scan, setting, split_data(scan.recordings, "recording", 0))
     alone = gather_samples(recordings, plan).stable
-    assert_same(alone, gather_samples(recordings, plan, PROCESSES).stable)
+    assert_same(alone, gather_samples(recordings, plan, cluster).stable)
     kept = {len(own.units) for own in alone.values()}
     assert all(n <= max_samples for n in kept)
     used = np.unique(alone["thumb"].recordings)
@@ -65,15 +75,15 @@ def test_samples_do_not_depend_on_the_engine(folder, max_samples):
 
 
 @pytest.mark.parametrize("split", ["recording", "random"])
-def test_processes_give_the_same_model_and_metrics(folder, split, tmp_path):
+def test_a_cluster_gives_the_same_model_and_metrics(folder, cluster, split, tmp_path):
     setting = Setting(split=split, max_samples=500)
     warned, warned_there = [], []
     alone = train(load_dataset(folder), setting, warn=warned.append)
-    there = train(load_dataset(folder), setting, warn=warned_there.append, engine=PROCESSES)
+    there = train(load_dataset(folder), setting, warn=warned_there.append, engine=cluster)
     assert contents(there.model, tmp_path) == contents(alone.model, tmp_path)
     assert (there.cross_validation, there.tares) == (alone.cross_validation, alone.tares)
     assert warned_there == warned
-    assert evaluate(there.model, load_dataset(folder), engine=PROCESSES) == evaluate(
+    assert evaluate(there.model, load_dataset(folder), engine=cluster) == evaluate(
         alone.model, load_dataset(folder)
     )
 

@@ -6,14 +6,7 @@ from typing import Annotated
 
 import typer
 
-from holdfast.cli.options import (
-    DEFAULT_JOBS,
-    ForceOption,
-    JobsOption,
-    JsonOption,
-    SeedOption,
-    TareOption,
-)
+from holdfast.cli.options import EngineOptions, ForceOption, JsonOption, SeedOption, TareOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast_lab.verbs import OutOption, QuickOption
@@ -38,7 +31,7 @@ def study(
             "by speed, untaught and taught.",
         ),
     ] = False,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     seed: SeedOption = 0,
     tare: TareOption = "0.5",
     force: ForceOption = False,
@@ -61,7 +54,6 @@ def study(
     from msgspec import json
 
     from holdfast.detection import Tare
-    from holdfast.parallel import Engine
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.report.terminal import PRINTED_COLUMNS, print_main_table
     from holdfast_lab.study.corpora import plan_study
@@ -75,15 +67,16 @@ def study(
     if seed < 0:
         raise ValueError(f"a seed of at least 0 expected, {seed} given")
     Tare.parse(tare)
+    engine = parallel.start()
     check_output_folder(out, STUDY, force=force)
     started_at = time.perf_counter()
     try:
         plan, left_out = plan_study(
-            data, out, seed, tare, jobs, quick=quick, full=full,
+            data, out, seed, tare, parallel.jobs, quick=quick, full=full,
             notify=print_message, steps=progress
         )  # fmt: skip
         tables = run_study(
-            plan, out, Engine(jobs), progress=progress, notify=print_message, force=force,
+            plan, out, engine, progress=progress, notify=print_message, force=force,
             made_in=time.perf_counter() - started_at, left_out=left_out,
         )  # fmt: skip
     except KeyboardInterrupt:

@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from holdfast.cli.options import (
-    DEFAULT_JOBS,
+    EngineOptions,
     ForceOption,
-    JobsOption,
     JsonOption,
     SeedOption,
 )
@@ -44,7 +43,7 @@ def trial(
     impacts: Annotated[
         int, typer.Option("--impacts", help="Impacts of tools before the load of each trial.")
     ] = 0,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -64,7 +63,6 @@ def trial(
       holdfast trial --out trials --laws fixed,holdfast --n 12 --json
       holdfast trial --out trials-hard --plant hard
     """
-    from holdfast.parallel import Engine
     from holdfast_lab.report.folder import check_output_folder
     from holdfast_lab.trial.experiment import COMPARISON, run_trials
     from holdfast_lab.trial.plan import ALL_ROWS, TrialPlan
@@ -73,9 +71,10 @@ def trial(
     number = n if n is not None else N_QUICK_TRIALS if quick else N_TRIALS
     plan = TrialPlan(names, number, seed, model, plant, impacts)
     check_output_folder(out, COMPARISON, force=force)
+    chosen = parallel.start()
     try:
         document = run_trials(
-            plan, out, Engine(jobs), progress=progress, notify=print_message, force=force
+            plan, out, chosen, progress=progress, notify=print_message, force=force
         )
     except KeyboardInterrupt:
         print_message(f"the finished trials are in {out}: the same command continues them")

@@ -65,6 +65,7 @@ def test_the_twin_simulates_the_recordings_first(capsys, monkeypatch, tmp_path):
         (("data", "--seed", -1), "-1 given"),
         (("data", "--jobs", 0), "0 given"),
         (("data", "--tare", "often"), "tare"),
+        (("data", "--engine", "spark"), "'spark'"),
     ],
 )
 def test_bad_input(capsys, data, tmp_path, monkeypatch, words, message):

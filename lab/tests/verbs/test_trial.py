@@ -46,6 +46,7 @@ def test_the_plant_reaches_the_trials_and_the_document(tmp_path, capsys, quick, 
     [
         (["--laws", "magic"], "'magic'"),
         (["--jobs", "0"], "0 given"),
+        (["--engine", "moon"], "'moon'"),
         (["--model", "nothing.json"], "nothing.json"),
     ],
 )

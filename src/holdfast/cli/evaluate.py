@@ -8,8 +8,7 @@ import typer
 
 from holdfast.cli.csv_options import CsvOptions
 from holdfast.cli.options import (
-    DEFAULT_JOBS,
-    JobsOption,
+    EngineOptions,
     JsonOption,
     ModelArgument,
     PlotOptions,
@@ -36,7 +35,7 @@ def evaluate(
     *,
     csv: CsvOptions,
     seed: SeedOption = 0,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     figure: PlotOptions,
     start: StartOptions,
     as_json: JsonOption = False,
@@ -61,7 +60,6 @@ def evaluate(
 
     from holdfast.detection import Model
     from holdfast.errors import TrainingError
-    from holdfast.parallel import Engine
     from holdfast.training.evaluation import evaluate_recordings
     from holdfast.training.verdict import no_verdict
 
@@ -72,12 +70,14 @@ def evaluate(
 
     figure.check()  # before the evaluation, which may take minutes
     loaded = Model.load(model)
+    started = parallel.start()
+    path = started.path(data)
     recordings: Sequence[Recording] = (
-        list(map(start.of, csv.read(data))) if csv.fits(str(data)) else start.load_dataset(data)
+        list(map(start.of, csv.read(path))) if csv.fits(str(path)) else start.load_dataset(path)
     )
     report_handling(loaded, recordings)
     evaluation = evaluate_recordings(
-        loaded, recordings, seed, Engine(jobs), progress=progress, keep=figure.plot is not None
+        loaded, recordings, seed, started, progress=progress, keep=figure.plot is not None
     )
     metrics = evaluation.metrics
     # Labelled samples without a decision count too: the labels are there.

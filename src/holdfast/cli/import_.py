@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from holdfast.cli.csv_options import CsvOptions, report_findings
-from holdfast.cli.options import DEFAULT_JOBS, RARE, ForceOption, JobsOption, JsonOption
+from holdfast.cli.options import RARE, EngineOptions, ForceOption, JsonOption
 from holdfast.cli.terminal.console import print_json, print_line, print_message, print_table
 from holdfast.cli.terminal.progress import progress
 
@@ -73,7 +73,7 @@ def import_(
     ],
     options: FormatOptions,
     layout: CsvOptions,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -96,10 +96,9 @@ def import_(
       holdfast import cut.mcap recovered/
     """
     from holdfast.import_tasks import import_all
-    from holdfast.parallel import Engine
 
-    task = options.task(out, layout, force=force)
-    result = import_all(path, task, Engine(jobs), notify=print_message, steps=progress)
+    engine, task = parallel.start(), options.task(out, layout, force=force)
+    result = import_all(path, task, engine, notify=print_message, steps=progress)
     print_imported(result, {}, as_json=as_json)
 
 

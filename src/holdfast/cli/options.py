@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from holdfast.devices.sources import Source
     from holdfast.io import Dataset
     from holdfast.live.stream_detector import StreamDetector
+    from holdfast.parallel import Engine
     from holdfast.recordings import Recording
     from holdfast.sensors import Sensor
 
@@ -80,20 +81,8 @@ SeedOption = Annotated[int, typer.Option("--seed", help="Seed of all random numb
 DEFAULT_JOBS = 1
 """Value of `--jobs` of every verb, as in scikit-learn: other processes take seconds to start, and
 each has the memory of its own recordings. Results do not depend on it."""
-
-
-def check_jobs(jobs: int) -> int:
-    """Return a number of processes, which is not 0."""
-    if jobs == 0:
-        raise ValueError("jobs other than 0 expected, 0 given")
-    return jobs
-
-
 JobsOption = Annotated[
-    int,
-    typer.Option(
-        "--jobs", help="Number of parallel processes; -1: one per processor.", callback=check_jobs
-    ),
+    int, typer.Option("--jobs", help="Number of parallel processes; -1: one per processor.")
 ]
 _TARE = typer.Option("--tare", help="Tare: seconds from the start, first, none, or START:END [s].")
 TareOption = Annotated[str, _TARE]
@@ -186,6 +175,34 @@ class StartOptions:
         from holdfast.live.stream_detector import StreamDetector
 
         return StreamDetector(model, source, in_contact=self.in_contact, **options)
+
+
+@dataclass(frozen=True)
+class EngineOptions:
+    """Group of options: where the work is done, and by how many processes."""
+
+    engine: Annotated[
+        str,
+        typer.Option(help="loky: processes of this machine; dask:ADDRESS: a Dask cluster."),
+        RARE,
+    ] = "loky"
+    jobs: JobsOption = DEFAULT_JOBS
+
+    def start(self) -> "Engine":
+        """Return the engine, after a connection to it.
+
+        Raises:
+            ValueError: there is no such engine, or no jobs.
+            EngineError: no cluster answers at the address, or a worker has another version.
+            MissingExtra: dask is not installed.
+        """
+        from holdfast.parallel import Engine
+
+        if self.jobs == 0:
+            raise ValueError("jobs other than 0 expected, 0 given")
+        started = Engine.parse(self.engine, self.jobs)
+        started.check()  # a wrong address is reported now, not after the data are read
+        return started
 
 
 @dataclass(frozen=True)

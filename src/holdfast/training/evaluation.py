@@ -170,11 +170,12 @@ def evaluate(
         model: to evaluate.
         recordings: labelled; of an iterator, they are evaluated in this process.
         seed: of the bootstrap.
-        engine: that reads the recordings.
+        engine: that reads the recordings. On a cluster, all machines need the recordings at the
+            same paths.
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: a process died.
+        EngineError: the engine cannot be used.
     """
     model = Model.of(model)
     if isinstance(recordings, Sequence):
@@ -203,7 +204,7 @@ def evaluate_recordings(
 
     Raises:
         ModelError: a recording has other fingers or sensors.
-        EngineError: a process died.
+        EngineError: the engine cannot be used.
     """
     parts = ((OneRecording(recordings, index),) for index in range(len(recordings)))
     trained_on: list[str] = []

@@ -110,14 +110,15 @@ def train(
         progress: iterates over recordings, choices and fits.
         n_jobs: number of processes on this machine; -1 for one per processor.
         engine: that reads the recordings, chooses and fits, instead of `n_jobs` processes. The
-            result is the same.
+            result is the same. On a cluster, all machines need the recordings at the same
+            paths.
 
     Raises:
         TrainingError: there are no labels, only one class, or too few recordings or objects
             for the split.
         ModelError: the model to adapt lacks a finger of the recordings.
         RecordingError: a recording cannot be read.
-        EngineError: a process died.
+        EngineError: the engine cannot be used.
     """
     setting, engine = setting or Setting(), engine or Engine(n_jobs)
     trainer = _Trainer.read(recordings, setting, warn, progress, engine)

@@ -9,6 +9,7 @@ import typer
 from holdfast.cli.options import RARE, SeedOption
 
 if TYPE_CHECKING:
+    from holdfast.parallel import Engine
     from holdfast.twin.simulation import Grasp
 
 
@@ -61,7 +62,7 @@ class GraspOptions:
         RARE,
     ] = ""
 
-    def plan(self) -> "list[Grasp]":
+    def plan(self, engine: "Engine") -> "list[Grasp]":
         """Return the grasps of an Allegro hand.
 
         Raises:
@@ -69,7 +70,8 @@ class GraspOptions:
         """
         from holdfast.simulated_grasps import plan_grasps
 
+        table = None if self.table is None else engine.path(self.table)
         return plan_grasps(
             self.objects, self.cases, self.repeats, self.profile, self.seed,
-            server=self.server, table=self.table, faults=self.faults, sensor=self.sensor,
+            server=self.server, table=table, faults=self.faults, sensor=self.sensor,
         )  # fmt: skip

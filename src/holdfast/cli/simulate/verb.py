@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.extensions import SimulatorOptions
-from holdfast.cli.options import DEFAULT_JOBS, ForceOption, FpsOption, JobsOption, JsonOption
+from holdfast.cli.options import EngineOptions, ForceOption, FpsOption, JsonOption
 from holdfast.cli.simulate.options import GraspOptions
 from holdfast.cli.terminal.console import print_json, print_line, print_message
 from holdfast.cli.terminal.progress import progress
@@ -20,7 +20,7 @@ def simulate(
     *,
     options: GraspOptions,
     simulators: SimulatorOptions,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     video: Annotated[
         bool,
         typer.Option(
@@ -44,7 +44,8 @@ def simulate(
     With --randomize, every recording has another hand: two to four fingers or a parallel
     gripper, six kinds of sensors in counts or newtons at 30 to 500 Hz, another object, and an arm
     that carries, swings, brakes and turns; with --grasps, several recordings of each. Only
-    --repeats, --grasps, --seed, --jobs and --force apply then (--help-all).
+    --repeats, --grasps, --seed, --engine, --jobs and --force apply then (--help-all). With --engine
+    dask:ADDRESS, the workers write into OUT, which all machines need at the same path.
 
     Example:
       holdfast simulate twin/ --jobs -1
@@ -54,9 +55,7 @@ def simulate(
       holdfast simulate filmed/ --profile slips --cases 2 --repeats 1 --video
     """
     require_extras("twin", "parquet", *(("video",) if video else ()))
-    from holdfast.parallel import Engine
-
-    engine = Engine(jobs)
+    engine = parallel.start()
     if chosen := simulators.chosen():
         profile, simulator, values = chosen[0]
         names = simulator.simulate(out, options, values, engine=engine, force=force)
@@ -64,7 +63,7 @@ def simulate(
     else:
         from holdfast.simulated_grasps import film_all, simulate_grasps
 
-        profile, planned = options.profile, options.plan()
+        profile, planned = options.profile, options.plan(engine)
         out.mkdir(parents=True, exist_ok=True)
         names = simulate_grasps(
             planned, out, engine=engine, force=force, notify=print_message, steps=progress

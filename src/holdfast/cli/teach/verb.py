@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from holdfast.cli.options import (
-    DEFAULT_JOBS,
     RARE,
+    EngineOptions,
     ForceOption,
-    JobsOption,
     JsonOption,
     ModelOutput,
     SeedOption,
@@ -54,7 +53,7 @@ def teach(
         ),
     ] = 1.5,
     speed: Annotated[SpeedOption, RARE] = 1.0,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     seed: Annotated[SeedOption, RARE] = 0,
     force: ForceOption = False,
     start: StartOptions,
@@ -82,12 +81,11 @@ def teach(
     from holdfast.cli.teach.report import NO_SLIPS, print_taught
     from holdfast.detection import Model
     from holdfast.files import refuse_overwrite
-    from holdfast.parallel import Engine
     from holdfast.training.teaching import teach_with_report
 
     guide.check(source, data, speed)
     refuse_overwrite(out, force=force)
-    base_model = Model.load(model)
+    base_model, engine = Model.load(model), parallel.start()
     base, steps, path = base_model, [], data
     if path is None:
         folder = guide.run(source, base_model, out, speed)
@@ -102,14 +100,9 @@ def teach(
             else:
                 print_paragraph(f"{out}: {NO_SLIPS}")
             return
-    recordings = start.load_dataset(path)
+    recordings = start.load_dataset(engine.path(path))
     taught = teach_with_report(
-        base,
-        recordings,
-        false_alarms=false_alarms,
-        seed=seed,
-        engine=Engine(jobs),
-        progress=progress,
+        base, recordings, false_alarms=false_alarms, seed=seed, engine=engine, progress=progress
     )
     taught.model.save(out, force=force)
     report_too_few_taxels(taught.model, recordings)

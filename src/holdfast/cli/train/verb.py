@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 import typer
 
 from holdfast.cli.options import (
-    DEFAULT_JOBS,
+    EngineOptions,
     ForceOption,
-    JobsOption,
     JsonOption,
     ModelOutput,
     StartOptions,
@@ -46,7 +45,7 @@ def train(
             show_default=False,
         ),
     ] = None,
-    jobs: JobsOption = DEFAULT_JOBS,
+    parallel: EngineOptions,
     force: ForceOption = False,
     start: StartOptions,
     as_json: JsonOption = False,
@@ -73,22 +72,22 @@ def train(
         if options != TrainingOptions():
             raise ValueError("--for slip has its own parameters and features: leave the others out")
         teach(
-            out=model, data=data, model=init or "builtin:any", jobs=jobs, force=force,
+            out=model, data=data, model=init or "builtin:any", parallel=parallel, force=force,
             start=start, as_json=as_json,
         )  # fmt: skip
         return
     require_extras("train")
     from holdfast.files import refuse_overwrite
     from holdfast.labelling.review.findings import report_hidden_labels
-    from holdfast.parallel import Engine
     from holdfast.training import train as fit
     from holdfast.training.verdict import no_verdict
 
     setting = options.setting(init)
     refuse_overwrite(model, force=force)  # before a training, which may take hours
-    recordings = start.load_dataset(data)
+    started = parallel.start()
+    recordings = start.load_dataset(started.path(data))
     report_hidden_labels(recordings.paths, print_message)
-    trained = fit(recordings, setting, warn=print_message, progress=progress, engine=Engine(jobs))
+    trained = fit(recordings, setting, warn=print_message, progress=progress, engine=started)
     trained.model.save(model, force=force)
     split, n, scores = trained.split, len(recordings), trained.cross_validation
     if as_json:
