@@ -1,9 +1,8 @@
 """Write vectors.h: the tables of a small hand and its model, samples, and estimates of them.
 
-    python tests/kernel/write_vectors.py > tests/kernel/vectors.h
+    python tests/kernel/write_vectors.py > vectors.h
 
-`check_vectors.c` holds the kernel equal to them, without Python. Write them again only if the
-mathematics or the numbers of kinds change.
+`check_vectors.c` holds a kernel of any compiler equal to them, without Python.
 """
 
 import re
@@ -144,7 +143,7 @@ def main():
         if k % EVERY == 0:
             numbers += map(number, features[k].ravel().tolist())
     parts = [
-        "/* Written by write_vectors.py; do not edit. */\n",
+        "/* Written by write_vectors.py. */\n",
         "#ifdef HOLDFAST_VECTORS_FIXED\n",
         *(f"#define HOLDFAST_{name.upper()} {n}\n" for name, n in made.sizes.items()),
         '#endif\n#ifdef HOLDFAST_VECTORS_LINKED\n#include "holdfast.h"\n',
