@@ -104,46 +104,6 @@ ROWS = [
 ]  # fmt: skip
 
 
-class TestFigures:
-    figures = script.Figures({"t": ROWS})
-
-    def test_a_cell(self):
-        a = {"method": "a"}
-        assert self.figures.cell("t", a) == "91.2"
-        assert self.figures.cell("t", a, 2, interval=True) == "91.25 (90.00 to infinite)"
-        assert self.figures.cell("t", a, 0, field="paper") == "95"
-        assert self.figures.cell("t", {"method": "b", "figure": "x"}) == "infinite"
-        assert self.figures.cell("no such table", a) == "–"
-
-    def test_a_cell_must_be_one_row(self):
-        with pytest.raises(LookupError, match=r"t: one row expected for .*, 2 found"):
-            self.figures.cell("t", {"method": "b"})
-        with pytest.raises(LookupError, match="0 found"):
-            self.figures.cell("t", {"method": "c"})
-        assert self.figures.any_cell("t", {"method": "c"}) == "–"
-
-    def test_a_key_that_rows_do_not_have_excludes_nothing(self):
-        assert self.figures.cell("t", {"method": "a", "on": "unseen"}) == "91.2"
-
-    def test_a_grid(self):
-        assert self.figures.grid("t", {}, ["method"], digits_of={"x": 2}) == (
-            "| method | x | y\\_z |\n"
-            "| --- | --: | --: |\n"
-            "| a | 91.25 (90.00 to infinite); paper 95.00 | – |\n"
-            "| b | infinite (infinite to infinite) | 98.2 (−1.0 to 2.0) |"
-        )
-        assert "no rows" in self.figures.grid("u", {}, ["method"])
-
-    @pytest.mark.parametrize("false", ["FPR", "FDR"])
-    def test_the_share_of_stable_labels_follows_from_three_figures(self, false):
-        """80 of 200 are stable; 8 of these are missed, and 18 of the others called stable."""
-        given = {"accuracy": 87.0, "FNR": 10.0, "FPR": 15.0, "FDR": 20.0}
-        rows = [{"figure": name, "ours": value} for name, value in given.items()]
-        figures = script.Figures({"t": rows})
-        share = figures.share_stable("t", {}, ("accuracy", "FNR", false))
-        assert share == pytest.approx(40.0)
-
-
 CSV = """method,figure,ours,paper,difference,n,low,high
 a,x,91.25,95.0,-3.75,2,90.0,
 b,x,inf,,,2,,

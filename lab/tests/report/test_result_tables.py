@@ -89,15 +89,6 @@ def test_csv_holds_every_value_to_the_last_digit(given_rows):
     assert read == given_rows
 
 
-def test_csv_by_hand():
-    made = table(row(94.25, 95.3, n=60, interval=(92.0, math.inf)), row(math.nan, figure='"x", y'))
-    assert to_csv(made) == (
-        "classifier,figure,ours,paper,difference,n,low,high\n"
-        "LogReg,Acc,94.25,95.3,-1.05,60,92.0,inf\n"
-        'LogReg,"""x"", y",,,,,,\n'
-    )
-
-
 def test_json_is_strict_and_marks_infinite_values():
     made = table(row(math.inf, n=3, interval=(0.1, math.inf)), row(math.nan, figure="FDR"))
     document = json.loads(json.dumps(to_json(made), allow_nan=False))

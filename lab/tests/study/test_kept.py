@@ -27,13 +27,6 @@ def test_what_does_not_fit_is_made_again_and_what_fits_stays():
     assert made == ["a", "b", "c", "c"]
 
 
-def test_a_value_that_cannot_be_made_is_not_kept():
-    kept = KeptValues(10)
-    with pytest.raises(ZeroDivisionError):
-        kept.get("a", lambda: 1 / 0, one_byte)
-    assert kept.get("a", lambda: 7, one_byte) == 7
-
-
 def test_the_bytes_of_a_recording_are_those_of_its_arrays():
     recording = recording_with_truth("made", seed=0)
     without = sum(m.readings.nbytes + m.times.nbytes for m in recording.modules.values())

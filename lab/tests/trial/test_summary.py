@@ -48,15 +48,6 @@ class TestCompare:
         assert found["slid_less"] == {"value": 0.0, "interval": [0.0, 0.0]}
         assert found["reacted_later"] == {"value": 0.0, "interval": [0.0, 0.0]}
 
-    def test_the_other_way_round_is_the_negative(self):
-        a = [result(number=k, force_ratio=1 + k / 4, slip=k / 1e3) for k in range(4)]
-        b = [result(number=k, dropped=k > 1, slip=0.0015) for k in range(4)]
-        there, back = compare(a, b), compare(b, a)
-        for name in ("dropped", "force_ratio_mean"):
-            assert there[name]["value"] == -back[name]["value"]
-            assert there[name]["interval"] == [-end for end in back[name]["interval"][::-1]]
-        assert there["slid_less"] == back["slid_more"]
-
 
 def test_rates_of_false_reactions_may_have_other_quiet_times():
     ours = [result(number=k, n_false=1, quiet_time=3.0) for k in range(3)]

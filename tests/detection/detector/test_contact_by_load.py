@@ -156,17 +156,6 @@ def test_a_finger_that_touches_is_unstable_at_first():
     assert (states[330:] == STABLE).all()
 
 
-def test_a_force_that_leaves_keeps_its_probability():
-    """It is UNSTABLE by its force: the probability is that of the features."""
-    model = Model.load("builtin:any")
-    raw = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
-    trace = detect(raw, recording_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (2, 0)))).fingers[
-        "a"
-    ]
-    leaving = trace.state == UNSTABLE
-    assert leaving.any() and (trace.stable_probability[leaving] > 0).all()
-
-
 @pytest.mark.parametrize(("share", "noise"), [(0.4, 1e-3), (1.8, 1e-3), (0.3, 8e-3)])
 def test_a_force_of_which_a_large_share_comes_or_goes_at_once_is_unstable(share, noise):
     """The classifier of stability alone may call it stable, as it learns from slips."""

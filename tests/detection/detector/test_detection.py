@@ -245,14 +245,6 @@ class TestSlip:
         )
         assert (decisions.raised_at(np.array([threshold]))[0] == decisions.raised).all()
 
-    def test_a_speed_changes_nothing_else(self):
-        made, slips = recording(**CLOCKS["one clock"]), ("thumb", "index")
-        plain = detect(model(slips=slips, own=TAXELS), made)
-        found = detect(model(slips=slips, own=TAXELS, speeds=slips), made)
-        for name, trace in plain.fingers.items():
-            for one, other in zip(found.fingers[name][:-2], trace[:-2], strict=True):
-                assert np.array_equal(one, other, equal_nan=True)
-
     @pytest.mark.parametrize("clock", ["one clock", "two rates", "since 1970", "broken"])
     def test_distance_is_the_sum_of_the_speed(self, clock):
         """Both are 0 while the finger does not slide, and NaN while UNKNOWN."""
@@ -302,39 +294,6 @@ class TestSlip:
             n_raised += found.sum()
         assert n_raised
 
-    def test_the_probability_is_smoothed(self):
-        """s(k) = s(k-1) + gain (z(k) - s(k-1)), from the log odds z without smoothing."""
-        made = recording(thumb=tactile(seed=1))
-        smoothed = model(("thumb",), slips=("thumb",))
-        plain = with_slip(smoothed, smoothing=0.0)
-        values = [log_odds_of(detect(one, made).fingers["thumb"]) for one in (plain, smoothed)]
-        gain = smoothed.finger("thumb").slip.gain(RATE)
-        assert 0 < gain < 1
-        first = np.flatnonzero(np.isfinite(values[0]))[0]
-        expected = [values[0][first]]
-        for value in values[0][first + 1 :]:
-            expected.append(expected[-1] + gain * (value - expected[-1]))
-        np.testing.assert_allclose(values[1][first:], expected, rtol=1e-9, atol=1e-9)
-
-    def test_unknown_has_no_slip_and_forgets_it(self):
-        trace = detect(
-            model(("thumb",), slips=("thumb",)), recording(thumb=CLOCKS["broken"]["thumb"])
-        ).fingers["thumb"]
-        unknown = trace.state == 0
-        assert unknown.any() and not unknown.all()
-        assert np.isnan(trace.slip_probability[unknown]).all()
-        assert not np.isnan(trace.slip_probability[~unknown]).any()
-        assert not (trace.cause[unknown] == SLIP_CODE).any()
-
-    def test_without_contact_nothing_slides(self):
-        trace = detect(
-            model(("thumb",), threshold=1e6, slips=("thumb",)), recording(thumb=tactile(seed=1))
-        ).fingers["thumb"]
-        empty = trace.state == STATES.index(ContactState.NO_CONTACT)
-        assert empty.any()
-        assert (trace.slip_probability[empty] == 0).all()
-        assert not (trace.cause == SLIP_CODE).any()
-
     def test_unloading_ends_a_slip_at_once(self):
         """Also within the hold time."""
         module = tactile(seed=1)
@@ -351,11 +310,6 @@ class TestSlip:
         assert not slides[empty].any()
 
 
-def log_odds_of(trace):
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.log(trace.slip_probability) - np.log1p(-trace.slip_probability)
-
-
 def with_slip(hand_model, **fields):
     return hand_model.changed(lambda part: part.with_heads(replace(part.slip, **fields)))
 
@@ -367,11 +321,6 @@ class TestIntervalTare:
         for name, module in made.modules.items():
             expected = fingertip_force(module.readings, module.sensor, (0.5, 0.9), module.times)
             assert np.array_equal(found.fingers[name].force, expected)
-
-    def test_a_finger_may_be_missing(self):
-        found = detect(model(tare="0.5:0.9"), recording(index=tactile(seed=2)))
-        expected = fingertip_force(tactile(seed=2).readings, sensor(), (0.5, 0.9))
-        assert np.array_equal(found.fingers["index"].force, expected)
 
     def test_is_refused_live(self):
         with pytest.raises(ModelError, match=r"0.5:0.9"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Fault, faults_of
-from holdfast.detection import Detector, Model, detect
+from holdfast.detection import Model, detect
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import built_in_sensors, sensor
 
@@ -176,16 +176,3 @@ def test_a_hand_that_lets_go_in_two_samples_has_released():
     trace = traced(which, readings, "builtin:any")
     assert not trace.faults.any()
     assert (trace.state[850:] == NO_CONTACT).all()
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_live_is_as_batch(model):
-    which = SKINS["anyskin"]
-    readings = rezeroed(which, at=600)
-    readings[450:550, 2, 0] -= 9830.0
-    trace = traced(which, readings, model)
-    detector = Detector(Model.load(model), {"thumb": which}, 100.0)
-    for k, sample in enumerate(readings):
-        finger = detector.update({"thumb": sample}, TIMES[k]).fingers["thumb"]
-        assert finger.state.code == trace.state[k]
-        assert finger.faults == faults_of(int(trace.faults[k]))

@@ -65,14 +65,6 @@ def test_features_of_motions_by_hand():
     assert row == pytest.approx([3.5, 0.5, 2.5, 0.6, 0.8, 1 - mean_unit, 3.0, 4.0])
 
 
-def test_opposite_motions_do_not_cancel():
-    """Their mean is 0, but their magnitudes and their spread remain."""
-    (row,) = motion_features(np.array([[[2.0, 0.0], [-2.0, 0.0]]]))
-    assert row == pytest.approx([2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 2.0])
-    (still,) = motion_features(np.zeros((1, 2, 2)))
-    assert still == pytest.approx([0, 0, 0, 0, 0, 1, 0, 0])
-
-
 def test_a_motion_is_the_change_of_the_shear_over_a_sixtieth_of_a_second():
     """At 100 Hz these are 2 samples: of 0 and 0.02 s, (1, 2) to (2, 4) and (4, 5) to (0, 6)."""
     rows = taxel_motion(hand(thumb=THUMB))["thumb"]

@@ -77,12 +77,3 @@ def test_a_silent_finger_is_left_out_of_the_largest_sigma():
     half = len(readings) // 2
     assert rows[first][half + 5 :, 2] == pytest.approx(rows[first][half + 5 :, 1])
     assert np.isnan(rows[second][half + 5 :]).any(axis=1).all()
-
-
-def test_the_energy_keeps_the_mean_of_the_details():
-    """A slope of 3 a sample: every detail is -3 / sqrt(2), so E = 7 x 9 / 2 and sigma = 0."""
-    hand = pressed(along_normal(100 + 3.0 * np.arange(30)))
-    energy = METHODS["energy"].features(hand)["index"][13:, 0]
-    assert energy == pytest.approx(np.full(17, np.log10(31.5)))
-    sigma = METHODS["log_two"].features(hand)["index"][13:, 1]
-    assert (sigma < -5).all()

@@ -1,10 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from holdfast.detection import DEPLOYED_FEATURES, Linear
-from holdfast.training.classifiers.fitting import Fitted, Samples
+from holdfast.detection import DEPLOYED_FEATURES
+from holdfast.training.classifiers.fitting import Samples
 from holdfast.training.classifiers.logreg import LogisticRegression
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
@@ -18,7 +16,6 @@ from holdfast_lab.study.paper.random_split import (
     VALIDATED,
     FitBudget,
     FixedWeights,
-    confusion_counts,
     evaluate_variants,
     rate_rows,
     search,
@@ -164,37 +161,6 @@ def test_class_weights_are_fixed_whatever_the_search_draws(corpora):
         budget = FitBudget(4, 500)
         (cell,) = evaluate_variants(main, "index", 14, kinds, budget, 0, thorough=False)
         assert cell.parameters["class_weight"] == weight
-
-
-RULE = Fitted(Linear((0.0,), (1.0,), ((1.0,),), (0.0,)), 0.5)
-"""Stable where the feature is at least 0."""
-
-
-def count_one_by_one(features, stable, groups, n):
-    """[TN, FP, FN, TP] of each recording, sample by sample."""
-    found = [[0, 0, 0, 0] for _ in range(n)]
-    for value, truth, group in zip(features[:, 0], stable, groups, strict=True):
-        called = value >= 0
-        found[group][
-            ["TN", "FP", "FN", "TP"].index(
-                ("T" if called == truth else "F") + ("P" if called else "N")
-            )
-        ] += 1
-    return found
-
-
-@given(
-    st.lists(
-        st.tuples(st.sampled_from([-1.0, 0.0, 2.0]), st.booleans(), st.integers(0, 3)), max_size=60
-    )
-)
-@settings(max_examples=50)
-def test_confusions_are_those_of_a_loop(rows):
-    features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
-    stable = np.array([row[1] for row in rows], dtype=bool)
-    groups = np.array([row[2] for row in rows], dtype=np.int64)
-    found = confusion_counts(RULE, Samples(features, stable, groups), 5)
-    assert found.tolist() == count_one_by_one(features, stable, groups, 5)
 
 
 def test_rates_by_hand():
