@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from holdfast.errors import EngineError, OutputError
+from holdfast.errors import EngineError
 from holdfast.kernel.batch import max_threads
 from holdfast.parallel import Engine
 from holdfast_lab import tasks as work
@@ -179,37 +179,9 @@ def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
-def test_the_same_call_under_two_names_is_made_once(tmp_path, log):
-    twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
-    assert TaskRunner(tmp_path).run(twins) == {"a": 1, "b": 1}
-    assert calls(log) == {"1": 1}
-
-
 def test_two_tasks_of_one_name_are_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
         TaskRunner(tmp_path).run(tasks(2) + tasks(1))
-
-
-def test_tasks_of_high_cost_start_first(tmp_path):
-    seen = []
-
-    def follow(items, what, total, cost):
-        seen.append((what, total))
-        for item in items:
-            seen.append((item[0].name, cost(item)))
-            yield item
-
-    costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
-    TaskRunner(tmp_path, progress=follow).run(
-        [Task(name, figure, (0, k), Figure, costs[name]) for k, name in enumerate(costs)]
-    )
-    assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
-
-
-def test_a_folder_that_cannot_be_made(tmp_path):
-    (tmp_path / "work").touch()
-    with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
-        TaskRunner(tmp_path).run(tasks(1))
 
 
 def test_a_damaged_result_is_computed_again(tmp_path):

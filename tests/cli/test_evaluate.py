@@ -104,12 +104,6 @@ def test_the_verdict_is_from_unseen_recordings_only(capsys, grasps, tmp_path):
     assert len(json.loads(out)["recordings"]) == 2
 
 
-def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, grasps, tmp_path):
-    folder = mixed(grasps, tmp_path, labels=False)
-    _, out, _ = run(capsys, grasps / "model.json", folder, "--json")
-    assert json.loads(out)["verdict"] is None
-
-
 def test_a_plot_is_overwritten_only_by_force(capsys, grasps, tmp_path):
     plot = tmp_path / "plot.png"
     words = [grasps / "model.json", grasps / "new", "--plot", plot]
@@ -131,16 +125,6 @@ def twin_grasp(tmp_path_factory):
     path = tmp_path_factory.mktemp("twin") / "box.parquet"
     save_recording(recording, path)
     return path
-
-
-def test_the_model_of_the_twin_fits_a_grasp_of_the_twin(capsys, twin_grasp):
-    code, out, err = run(capsys, "builtin:twin", twin_grasp, "--json")
-    assert (code, err) == (0, "")
-    report = json.loads(out)
-    assert list(report["fingers"]) == ["thumb", "index", "middle", "ring"]
-    assert report["trained_on"] == []
-    assert report["pooled"]["accuracy"] > 80
-    assert report["pooled"]["auc"] > 0.9
 
 
 def test_a_truth_with_impacts_has_a_line_of_its_own(capsys, twin_grasp, tmp_path):

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from command_line import Verb
-from holdfast.cli.options import awaited
 from holdfast.cli.terminal import progress
 from holdfast.contact import Fault
 from holdfast.devices.sources import open_source
@@ -136,26 +135,6 @@ def test_it_repeats_until_it_is_interrupted(path, ending):
     assert json.loads(out)["packets"] >= 1500  # more than the recording has
     times = [a.time for a in listener.arrivals]
     assert len(times) == 1500 and (np.diff(times) > 0).all()
-
-
-def test_readings_that_are_not_counts(capsys, tmp_path):
-    one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.full((3, 16, 3), -2.0))
-    save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
-    code, out, err = play(capsys, tmp_path / "x.parquet", "--port", 0)
-    assert (code, out) == (2, "")
-    assert err.splitlines()[-1].startswith("holdfast: finger1: readings from 0 to 65535 counts")
-
-
-@pytest.mark.parametrize(
-    ("source", "text"),
-    [
-        ("xela://auto", "waiting for the first packet of xela://auto"),
-        ("twin:?object=can", "simulating the first grasp of twin:?object=can"),
-        ("grasp.parquet", ""),
-    ],
-)
-def test_what_a_command_waits_for(source, text):
-    assert awaited(source) == text
 
 
 def orca_recording(path, n=300):

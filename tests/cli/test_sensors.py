@@ -1,5 +1,4 @@
 import json
-import math
 import re
 
 import pytest
@@ -10,7 +9,6 @@ from holdfast.sensors import (
     Sensor,
     built_in_hands,
     built_in_sensors,
-    flat_sensor,
     hand,
     sensor,
 )
@@ -90,14 +88,6 @@ def test_plots_have_the_numbers_of_taxels():
         texts = [text.get_text() for axes in figure.axes for text in axes.texts]
         numbers = [int(text) for text in texts if text.isdecimal()]
         assert numbers == [number for size in sizes for number in range(1, size + 1)]
-
-
-def test_plots_a_sensor_of_one_oblique_taxel(capsys, tmp_path):
-    path, third = tmp_path / "one.json", 1 / math.sqrt(3)
-    flat = flat_sensor("one", 1, 1, 0.005).to_dict()
-    flat |= {"normal": [third, third, third]}
-    path.write_text(json.dumps(flat))
-    shown(capsys, path, "--plot", tmp_path / "one.png")
 
 
 def test_a_template_is_read_back(capsys, tmp_path):

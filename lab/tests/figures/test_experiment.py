@@ -9,7 +9,7 @@ from holdfast.plots.style import (
     STATE_COLOURS,
 )
 from holdfast.plots.time_series import FingerSeries
-from holdfast_lab.figures.experiment import draw_experiment, draw_features, draw_forces
+from holdfast_lab.figures.experiment import draw_experiment, draw_forces
 
 pytestmark = pytest.mark.slow
 
@@ -64,13 +64,6 @@ def test_predictions_are_strips_with_their_accuracy():
         (1.1, 1.6, STATE_COLOURS[STABLE]),
     }
     assert axes.get_xlim() == (0.2, 1.2)
-
-
-@pytest.mark.parametrize("n", [0, 4])
-def test_a_series_of_few_samples_is_drawn(n):
-    given = series(n)
-    for figure in (draw_forces(given), draw_features(given), draw_experiment(given, {}, {})):
-        drawn(figure)
 
 
 def test_long_recordings_keep_their_peaks():

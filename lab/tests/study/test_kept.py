@@ -3,10 +3,10 @@
 import pytest
 
 from holdfast_lab.study.evaluation.recording_features import prepared_recordings
-from holdfast_lab.study.kept import KeptValues, recording_bytes, usable_memory
+from holdfast_lab.study.kept import KeptValues, usable_memory
 from holdfast_lab.study.plan import scan_corpus
 
-from .example_recordings import recording_with_truth, save_synthetic
+from .example_recordings import save_synthetic
 
 
 def one_byte(_):
@@ -25,18 +25,6 @@ def test_what_does_not_fit_is_made_again_and_what_fits_stays():
     for key in "abcabc":
         kept.get(key, lambda key=key: made.append(key), one_byte)
     assert made == ["a", "b", "c", "c"]
-
-
-def test_the_bytes_of_a_recording_are_those_of_its_arrays():
-    recording = recording_with_truth("made", seed=0)
-    without = sum(m.readings.nbytes + m.times.nbytes for m in recording.modules.values())
-    truth = recording.truth
-    arrays = [
-        truth.times,
-        *truth.hand.values(),
-        *(a for f in truth.fingers.values() for a in f.values()),
-    ]
-    assert recording_bytes(recording) == without + sum(array.nbytes for array in arrays)
 
 
 @pytest.mark.parametrize("text", ["max\n", "", str(1 << 60), "1048576\n"])

@@ -43,10 +43,6 @@ class TestLeastNormalForce:
         ]
         assert 1.1 * level < least_normal_force(beside, LIFT, 0.5) < math.inf
 
-    def test_one_finger_or_none_carries_nothing(self):
-        assert least_normal_force([patch(0.03)], LIFT, 0.5) == math.inf
-        assert least_normal_force([], LIFT, 0.5) == math.inf
-
 
 def test_a_trial_is_infeasible_where_no_force_holds_for_long():
     holds = np.ones(60)

@@ -21,15 +21,6 @@ def test_a_plan_refuses_what_cannot_be_run(given, message):
         TrialPlan(**given)
 
 
-def test_a_model_without_a_finger_is_refused(tmp_path):
-    model = Model.load("builtin:noise-floor")
-    one = model.fingers["*"]
-    lacking = msgspec.structs.replace(model, fingers={"thumb": one, "index": one, "middle": one})
-    lacking.save(tmp_path / "three.json")
-    with pytest.raises(ModelError, match="no ring"):
-        TrialPlan(model=str(tmp_path / "three.json"))
-
-
 def test_a_model_with_a_tare_of_a_recording_is_refused(tmp_path):
     model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare="0:1")
     model.save(tmp_path / "interval.json")

@@ -58,11 +58,6 @@ def test_trials_of_any_law_begin_alike(fixed):
     assert draw_trial(0).number == 0
 
 
-def test_a_constant_force_is_no_false_reaction():
-    double = run_trial(CAN, "fixed-2")
-    assert double.n_false == 0 and double.static_ratio > 1.5
-
-
 def test_samples_arrive_late_by_the_latency():
     seen = {}
     for latency in (0, 4):
@@ -87,11 +82,6 @@ def test_the_hard_plant_is_deterministic_and_another_hand():
     hard = replace(CAN, grasp=replace(CAN.grasp, plant="hard"), latency=3)
     first = run_trial(hard, "fixed")
     assert run_trial(hard, "fixed") == first != run_trial(CAN, "fixed")
-
-
-def test_true_slips_replace_the_estimates():
-    result = run_trial(CAN, "true-slips")
-    assert result.held and not result.dropped
 
 
 def test_a_law_that_knows_the_load_presses_by_its_multiple(monkeypatch):

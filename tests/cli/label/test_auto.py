@@ -116,10 +116,3 @@ def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
     for words in (("auto", "signal", path), ("auto", "signal", path, "--force")):
         assert "one.labels.json labels another recording" in refusal(capsys, *words)
     assert labels_path(path).read_bytes() == before
-
-
-def test_a_read_only_label_file(capsys, folder):
-    path = folder / "one.parquet"
-    run_json(capsys, "auto", "signal", path)
-    labels_path(path).chmod(0o444)
-    assert "one.labels.json cannot be written" in refusal(capsys, "auto", "signal", path)

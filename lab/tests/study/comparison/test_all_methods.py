@@ -98,16 +98,6 @@ def accuracy(metrics):
     return 100 * right / n
 
 
-def test_false_alarms_add_up(tables):
-    for row in rows_of(tables["events"], figure="false alarms under stable label, per minute"):
-        keys = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
-        parts = [
-            rows_of(tables["events"], **keys, figure=figure)[0]
-            for figure in ("of a glitch", "other false alarms")
-        ]
-        assert row.ours == pytest.approx(sum(part.ours for part in parts))
-
-
 def test_ours_beside_the_strongest_baseline(results, tables):
     table = tables["strongest"]
     assert {row.keys["on"] for row in table.rows} == {"unseen objects"}

@@ -79,20 +79,6 @@ def test_adapted_to_one_takes_one_with_both_classes(corpus, recordings, monkeypa
     assert {"r1"} in map(set, names) and {"r0"} in map(set, names) and ["r2"] not in names
 
 
-def test_from_nothing_has_the_features_of_the_model(corpus, monkeypatch):
-    settings = []
-    known = real_models.train
-    monkeypatch.setattr(
-        real_models, "train", lambda some, setting: settings.append(setting) or known(some, setting)
-    )
-    found = model_estimates("from nothing", corpus, 0)
-    shipped = Model.load(SHIPPED)
-    assert {setting.features for setting in settings} == {shipped.finger("finger1").stable.features}
-    assert {str(setting.tare) for setting in settings} == {shipped.tare}
-    assert {setting.init for setting in settings} == {None}
-    assert found != model_estimates("untouched", corpus, 0)
-
-
 def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypatch):
     def fail(*_):
         raise TrainingError("one class only")
@@ -136,13 +122,6 @@ class TestHand:
             self.finger([STABLE, STABLE, STABLE, STABLE], [0.8, 0.8, 0.8, 0.8]),
         ]
         assert real_models.smallest_probability(fingers).tolist() == [0.7, 0.1, 0.6, 0.5]
-
-    def test_without_enough_contacts_every_finger_keeps_its_score(self):
-        fingers = [
-            self.finger([NO_CONTACT, STABLE, NO_CONTACT, UNKNOWN], [0.3, 0.8, 0.2, np.nan]),
-            self.finger([NO_CONTACT, NO_CONTACT, STABLE, STABLE], [0.7, 0.1, 0.6, 0.5]),
-        ]
-        assert real_models.smallest_probability(fingers).tolist() == [0.3, 0.1, 0.2, 0.5]
 
     def test_a_decision_lasts_until_the_next(self):
         decided = FingerDecisions([0.01, 0.03], [0, 0], [STABLE, UNSTABLE], [0.9, 0.1])

@@ -12,7 +12,6 @@ from holdfast_lab.study.comparison.rows import (
     quotient_row,
     ratio_row,
     sample_rows,
-    without_estimate_row,
 )
 from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
 
@@ -49,12 +48,6 @@ def test_its_interval_draws_the_same_recordings_for_both():
     row = difference_row({}, first, second, seed=5)
     assert row.interval == pytest.approx(tuple(np.quantile(values, [0.025, 0.975])))
     assert difference_row({}, first, first, seed=0).interval == (0.0, 0.0)
-
-
-def test_only_recordings_of_both_are_compared():
-    first, second = metrics_of(RIGHT, HALF), metrics_of(HALF)
-    row = difference_row({}, first, second, seed=0)
-    assert (row.ours, row.n, row.interval) == (50.0, 1, None)
 
 
 def test_ratios_leave_out_recordings_with_nothing():
@@ -98,18 +91,3 @@ def test_a_quotient_of_error_shares_is_paired():
     assert row.ours == pytest.approx(3.0)
     assert row.interval == (pytest.approx(3.0), pytest.approx(3.0))
     assert row.n == 2
-
-
-def test_a_quotient_without_errors_of_ours_is_infinite():
-    base, none = np.array([[3, 10], [4, 10]]), np.array([[0, 10], [0, 10]])
-    row = quotient_row({"figure": "ratio"}, base, none, seed=0)
-    assert (row.ours, row.interval) == (np.inf, (None, None))
-    assert quotient_row({"figure": "ratio"}, none, none, seed=0).ours is None
-    empty = quotient_row({"figure": "ratio"}, 0 * base, 0 * base, seed=0)
-    assert (empty.ours, empty.n, empty.interval) == (None, 0, None)
-
-
-def test_the_share_without_an_estimate():
-    row = without_estimate_row({"method": "one"}, [(100, 10), (300, 10)], seed=0)
-    assert row.keys == {"method": "one", "figure": "without estimate [%]"}
-    assert row.ours == pytest.approx(5.0)

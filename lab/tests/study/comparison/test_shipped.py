@@ -8,7 +8,6 @@ from holdfast_lab.study.comparison.shipped import (
     model_rows,
     shipped_counts,
     silenced,
-    speed_rows,
     tables,
     tasks,
     taught_counts,
@@ -50,16 +49,6 @@ def test_doing_nothing_finds_nothing_and_gives_no_alarm():
             "false alarms of the hand, per minute",
             "false slips of the hand, per minute")  # fmt: skip
     assert [found[name] for name in rest] == [0, 0, 0, 0, 0]
-
-
-def test_delays_by_the_speed_of_the_slip():
-    rows = {(r.keys["speed [mm/s]"], r.keys["figure"]): r.ours for r in speed_rows({}, [COUNTS])}
-    assert rows["0 to 2", "worst [s]"] == pytest.approx(-0.01)
-    assert rows["2 to 5", "slips"] == 2
-    assert rows["2 to 5", "worst [s]"] == math.inf
-    assert rows["2 to 5", "found within 0.1 s [%]"] == pytest.approx(50)
-    assert rows["over 18", "median [s]"] == pytest.approx(0.2)
-    assert rows["10 to 15", "slips"] == 0
 
 
 @pytest.mark.slow

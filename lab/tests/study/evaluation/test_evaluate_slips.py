@@ -6,7 +6,6 @@ from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
 from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
-from holdfast.metrics.slips import SlipCounts
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
@@ -109,15 +108,6 @@ class TestRanks:
         above = probability_of(log_odds_of(self.ranks[-1:] + 0.1, self.ranks))
         assert above >= SLIP_THRESHOLDS[-1]
 
-    def test_the_scale_of_the_scores_does_not_matter(self):
-        scores = np.linspace(-3, 3, 100)
-        np.testing.assert_allclose(
-            log_odds_of(scores, self.ranks), log_odds_of(10 * scores + 3, 10 * self.ranks + 3)
-        )
-
-    def test_no_estimate_stays_without(self):
-        assert np.isnan(log_odds_of(np.array([np.nan]), self.ranks)).all()
-
 
 def test_a_perfect_score_finds_every_slip_without_a_false_alarm():
     times = np.arange(3000) / RATE
@@ -185,24 +175,6 @@ def test_without_known_slips_there_are_no_results(tmp_path):
     corpus = scan_corpus("main", save_synthetic(tmp_path / "main", range(3)))
     for name in ("holdfast", "holdfast_stability"):
         assert evaluate_slips(job(name, corpus)) == {}
-
-
-def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
-    """What is tested does not change the choice."""
-    seen = []
-    summarise = module.summarise_choice
-
-    def noted(curves, *budget, training, **options):
-        seen.append([curve for fingers in training for curve in fingers.values()])
-        return summarise(curves, *budget, training=training, **options)
-
-    monkeypatch.setattr(module, "summarise_choice", noted)
-    evaluated(corpora, "holdfast")
-    of_others = [curves for curves in seen if curves]
-    assert len(of_others) == 2  # for each budget
-    for curve in map(SlipCounts.total, of_others):
-        held_seconds = 4 * (2 * 7.2 - 1.353)  # the thumb slips
-        assert curve[0].held_seconds == pytest.approx(held_seconds, rel=0.01)
 
 
 def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):

@@ -50,18 +50,6 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
         assert not np.isnan(score.probability[score.states(shift) != UNKNOWN]).any()
 
 
-def test_the_probability_of_a_hand_is_the_smallest_of_the_touching_fingers():
-    times = np.array([0.0, 1.0, 2.0])
-    margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
-               "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
-    touching = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
-    thresholds = {"a": 2.0, "b": 0.0, "c": 0.0}
-    fingers = [Scores.of_finger(times, margins[f], thresholds[f], touching[f]) for f in margins]
-    found = Scores.of_hand(fingers).probability
-    odds = np.exp([1.0, 1.0, 2.0])
-    assert found == pytest.approx(odds / (1 + odds))
-
-
 def test_a_whole_hand_method_decides_for_no_finger():
     """Its estimate of the hand is the latest one of every finger."""
     recording = replace(
@@ -91,16 +79,6 @@ class Fixed:
 @pytest.fixture(scope="module")
 def corpus(tmp_path_factory):
     return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
-
-
-def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
-    training = MethodTraining.of(
-        METHODS["logreg"], corpus_features(METHODS["logreg"], corpus), max_samples=100
-    )
-    for samples in training.samples.values():
-        assert len(samples.positive) <= 100
-        assert np.bincount(samples.groups).min() >= 20
-        assert np.isfinite(samples.features).all()
 
 
 def test_a_missing_finger_is_not_evaluated(corpus):

@@ -86,14 +86,6 @@ def test_the_slip_ratio_by_hand():
     np.testing.assert_allclose(found, [0, 0.01 / 0.048, 0.005 / 0.048])
 
 
-@pytest.mark.parametrize(("held", "least"), [(2.0, 0.048), (10.0, 0.07), (50.0, 0.2)])
-def test_the_threshold_grows_with_the_force_between_its_limits(held, least):
-    hand = pressed(along_normal([held, held + 0.1]), RATE, "N")
-    threshold = np.clip(0.007 * (held + 0.1), 0.048, 0.2)
-    assert threshold == pytest.approx(least, rel=0.02)
-    assert SERVO.features(hand)["index"][1, 0] == pytest.approx(0.05 / threshold)
-
-
 def test_nothing_is_slip_while_the_grip_changes():
     closing = np.concatenate([np.zeros(50), np.linspace(0, 20, 100)])
     found = SERVO.features(pressed(along_normal(closing), 150.0, "N"))["index"][:, 0]
@@ -126,15 +118,3 @@ def test_the_window_of_the_spectrum_slides():
         wanted = [power[b].sum() * 2 / (30 * (weights**2).sum()) for b in bins]
         np.testing.assert_allclose(10 ** found[k], wanted)
     assert np.isnan(found[:29]).all()
-
-
-def test_the_energy_of_a_constant_force_is_finite():
-    found = METHODS["spectrum"].features(pressed(np.full((60, 3), 7.0), 150.0))["index"]
-    np.testing.assert_allclose(found[29:], -12, atol=0.01)
-
-
-def test_bands_above_half_the_rate_are_empty():
-    noise = np.random.default_rng(0).normal(size=(60, 3))
-    found = METHODS["spectrum"].features(pressed(noise, 60.0))["index"][20:]
-    assert (found[:, 3] == -12).all()
-    assert (found[:, :2] > -6).all()

@@ -67,13 +67,6 @@ def test_the_list(capsys):
     assert (document["licence"], document["size"], document["tried"]) == ("MIT", 26_000_000, True)
 
 
-@pytest.mark.parametrize("words", [(), ("list", "gtac-grasps")])
-def test_the_list_as_text(capsys, words):
-    code, out, _ = VERB.run(capsys, *words)
-    assert code == 0
-    assert "gtac" in out
-
-
 def test_from_the_registry_to_recordings(capsys, made_up, cache):
     document = document_of(capsys, "get", "made-up", "out")
     assert (document["n_files"], document["n_unchecked"], document["n_recordings"]) == (2, 2, 2)
@@ -121,12 +114,6 @@ def test_bad_input(capsys, made_up, cache):
     text = refused(capsys, "get", "made-up", "out")
     assert f"{cache}/made-up/two.csv" in text
     assert ".import." not in text
-
-
-def test_nothing_is_overwritten(capsys, made_up):
-    document_of(capsys, "get", "made-up", "out")
-    assert "exists already" in refused(capsys, "get", "made-up", "out")
-    document_of(capsys, "get", "made-up", "out", "--force")
 
 
 @pytest.mark.parametrize("name", FOLDERS)

@@ -7,14 +7,12 @@ import numpy as np
 import pytest
 
 from holdfast.detection import Model, detect
-from holdfast.errors import RecordingError
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast_interop.scene.hand_frames import frames_of
 from holdfast_interop.scene.taxel_arrows import (
     LONGEST_ARROW,
-    SHORTEST_ARROW,
     arrow_scale,
     module_forces,
     scene_instants,
@@ -86,25 +84,6 @@ def test_an_arrow_points_along_the_reading():
     assert arrows[-1, 0] == pytest.approx(LONGEST_ARROW * along)
 
 
-def test_a_gap_has_no_arrow():
-    still, short = pressed([0, 0, 50.0]), pressed([0, 0, 50.0], 60)
-    both = Recording("both", {"a": still.modules["finger1"], "b": short.modules["finger1"]})
-    arrows = module_forces(both, scene_instants(both))
-    last = both.start + both.duration
-    assert arrows["a"].sample_at(last, 0.0) is not None
-    assert arrows["b"].sample_at(last, 0.0) is None
-    assert series(both, {})["force"]["a"][1][-1] == pytest.approx(50.0)
-
-
-def test_declared_baselines_and_newtons_under_load_keep_the_load():
-    module = pressed([0, 0, 0]).modules["finger1"]
-    base = np.full((5, 3), 990.0).tolist()
-    declared = Recording("a", {"finger1": module}, {"baselines": {"finger1": base}})
-    held = Recording("b", {"finger1": replace(module, unit="N")}, {"starts_loaded": True})
-    for recording in (declared, held):
-        assert (np.linalg.norm(arrows_of(recording)[0], axis=1) > SHORTEST_ARROW).all()
-
-
 def test_frames_move_with_the_measured_tips():
     recording = pressed([0, 0, 50.0])
     times = recording.modules["finger1"].times
@@ -120,9 +99,3 @@ def test_frames_move_with_the_measured_tips():
     assert frames[0].at(1.5)[0] == pytest.approx(1.5)
     times, speeds = series(recording, {})["true_slip_speed"]["finger1"]
     assert speeds == pytest.approx(times)  # mm/s
-
-
-def test_a_recording_of_days_is_refused():
-    module = Tactile(sensor("anyskin"), [0.0, 1e5], np.zeros((2, 5, 3)))
-    with pytest.raises(RecordingError, match="at most 86400 s expected; cut it"):
-        scene_instants(Recording("long", {"finger1": module}))

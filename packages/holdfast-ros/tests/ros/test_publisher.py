@@ -208,14 +208,6 @@ def test_faulty_taxels_are_numbers_from_1():
     assert values["faulty_taxels"] == "4, 8"
 
 
-def test_diagnostics_before_and_after_estimates():
-    (before,) = diagnostics_of(None, 100.0)
-    assert before[:2] == ("hand", WARN)
-    (after,) = diagnostics_of((estimate(), 100.0), 103.2)
-    assert after[:2] == ("hand", ERROR)
-    assert after.values == (("seconds_since_estimate", "3"),)
-
-
 def test_topic_names_are_valid_in_ros():
     fingers = ["thumb", "index/1", "palm/2", "left/thumb", "1st", "a b-ä", "_x"]
     names = ["/thumb", "/index_1", "/palm_2", "/left/thumb", "/finger_1st", "/a_b_", "/finger_x"]

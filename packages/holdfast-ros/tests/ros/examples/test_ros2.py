@@ -102,11 +102,6 @@ def module(name, **members):
     return made
 
 
-def recorded(*args, **fields):
-    """Stand-in for the classes of `launch`."""
-    return types.SimpleNamespace(args=args, **fields)
-
-
 @pytest.fixture
 def example(monkeypatch):
     """A function that imports an example with stand-ins for the packages of ROS."""
@@ -117,13 +112,9 @@ def example(monkeypatch):
     for kind, made in [*KINDS.items(), ("diagnostic_msgs/DiagnosticStatus", status)]:
         package, _, name = kind.partition("/")
         packages.setdefault(package, {})[name] = made
-    launch = dict.fromkeys(("DeclareLaunchArgument", "ExecuteProcess"), recorded)
     stand_ins = [
         module("rclpy"),
         module("rclpy.node", Node=Node),
-        module("launch", LaunchDescription=recorded),
-        module("launch.actions", **launch),
-        module("launch.substitutions", LaunchConfiguration=recorded),
         *(module(package) for package in packages),
         *(module(f"{package}.msg", **members) for package, members in packages.items()),
     ]
@@ -189,13 +180,3 @@ def test_the_grip_follows_the_state(example, monkeypatch, unit):
     assert node.force == (1.0, 2.0, 3.0)
     node.largest_force = 3.0
     assert factor("UNSTABLE") == 1.0  # the grip is strong enough
-
-
-def test_the_launch_file_starts_programs_that_exist(example):
-    found = example("holdfast.launch.py").generate_launch_description()
-    ((*arguments, serve, watch, grip),) = found.args
-    words = [part if isinstance(part, str) else part.args[0] for part in serve.cmd]
-    assert words[:2] == ["holdfast", "serve"]
-    assert "--ros2" in words
-    assert set(words) >= {argument.args[0] for argument in arguments} - {"unit"}
-    assert all(Path(process.cmd[1]).is_file() for process in (watch, grip))

@@ -82,10 +82,6 @@ class TestModules:
         assert arrival.time == 0.002
         np.testing.assert_array_equal(arrival.samples["tip"], np.ones((9, 3)))
 
-    def test_a_sensor_that_is_off_is_left_out(self):
-        first = uskin(0), uskin(0, 2, "not_available", 0)
-        assert list(identified(*first).sensors) == ["finger1"]
-
     @pytest.mark.parametrize(
         ("message", "given", "text"),
         [
@@ -126,13 +122,6 @@ class TestTimes:
         assert [a.n_refused for a in arrivals] == [0] * 4 + [1] + [0] * 5
         times = [a.time - EPOCH for a in arrivals if a.samples]
         np.testing.assert_allclose(times, [0.01 * k for k in range(10) if k != 4], atol=1e-6)
-
-    def test_a_message_without_time_among_others_with(self):
-        assembler = identified(uskin(0), uskin(0, 2))
-        (arrival,) = assembler.assemble([uskin(1), uskin(1, 2)._replace(time=None)], 50.0)
-        assert set(arrival.samples) == {"finger1", "finger2"}
-        (arrival,) = assembler.assemble([uskin(2)._replace(time=None)], 50.01)
-        assert (arrival.samples, arrival.n_refused) == ({}, 1)
 
 
 class TestPackets:
