@@ -2,13 +2,12 @@ import math
 import time
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detection import Detector, detect
-from holdfast.errors import ModelError, StreamError
+from holdfast.errors import StreamError
 from holdfast.live.source_filter import MAX_BUFFERED_ARRIVALS
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording
@@ -59,11 +58,6 @@ def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
         assert (states == trace.state[:n]).mean() > 0.999
         forces = np.array([one.force for one in mine[:n]])
         np.testing.assert_allclose(forces, trace.force[:n], rtol=1e-6, atol=1e-6)
-
-
-def test_strict_refuses_a_source_of_another_rate():
-    with pytest.raises(ModelError, match=r"75 Hz given.*--rate resample"):
-        detected(slower(2), strict=True)
 
 
 def test_arrivals_are_buffered_until_the_rate_is_known():
@@ -187,12 +181,6 @@ def test_tared_readings_begin_at_zero():
     tared = detector.subtract_tare(arrivals[120].samples)
     assert set(tared) == set(build.FINGERS)
     assert all(np.abs(values).max() < 10 for values in tared.values())
-
-
-def test_a_tare_by_interval_is_refused():
-    model = msgspec.structs.replace(build.model(), tare="0:1")
-    with pytest.raises(ModelError, match="0:1"):
-        StreamDetector(model, build.Script.of(build.grasp()))
 
 
 def test_ignored_taxels_cause_no_fault():

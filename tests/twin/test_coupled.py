@@ -29,18 +29,6 @@ def errors() -> dict[str, Array]:
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
-def test_the_theory_has_its_limits() -> None:
-    """All slides: 3 mu P (2 - nu) / (16 G a); a small force: that of bodies that stick."""
-    theory = mindlin.Theory(200e3)
-    unit = 3 * 0.6 * 2.0 * 1.5 / (16 * 50e3 * theory.radius)
-    assert theory.way(1.0) == pytest.approx(unit)
-    stiffness = 8 * 50e3 * theory.radius / 1.5  # 8 G a / (2 - nu), on one body
-    assert theory.way(1e-4) == pytest.approx(1e-4 * 0.6 * 2.0 / stiffness, rel=1e-3)
-    assert theory.back(0.9, 0.9) == theory.way(0.9)
-    assert theory.back(-0.9, 0.9) == pytest.approx(-theory.way(0.9))
-    assert mindlin.stuck(0.875) == 0.5
-
-
 def test_hertz(errors: dict[str, Array]) -> None:
     for name, values in errors.items():
         limits = {"contact radius": 8.0, "peak pressure": 3.0}

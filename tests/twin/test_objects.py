@@ -164,27 +164,6 @@ def test_inertia_by_random_points(name: str) -> None:
     np.testing.assert_allclose(one.inertia, one.mass * (square.sum() - square), rtol=0.01)
 
 
-def test_inertia_of_shapes_with_a_formula(tmp_path: Path) -> None:
-    def made(shape: str, size: list[float]) -> GraspObject:
-        text = LINE.replace("cylinder", shape).replace("[0.035, 0.05, 0.003]", str(size))
-        (tmp_path / "t.toml").write_text(text.replace("mass = 0.2", "mass = 1.0"))
-        return load_objects(tmp_path / "t.toml")["mug"]
-
-    ball = made("sphere", [0.03])
-    np.testing.assert_allclose(ball.inertia, [0.4 * 0.03**2] * 3, rtol=2e-3)
-    box = made("box", [0.03, 0.04, 0.05, 0.001])
-    exact = (np.array([0.04, 0.03, 0.03]) ** 2 + np.array([0.05, 0.05, 0.04]) ** 2) / 3
-    np.testing.assert_allclose(box.inertia, exact, rtol=5e-3)
-    can = made("cylinder", [0.03, 0.05, 0.001])
-    across = 0.03**2 / 4 + 0.05**2 / 3
-    np.testing.assert_allclose(can.inertia, [across, across, 0.03**2 / 2], rtol=5e-3)
-    cone = made("frustum", [0.04, 0.02, 0.05, 0.001])
-    moment = 0.3 * (0.04**5 - 0.02**5) / (0.04**3 - 0.02**3)
-    assert cone.inertia[2] == pytest.approx(moment, rel=0.01)
-    height = 0.1 * (0.04**2 + 2 * 0.04 * 0.02 + 3 * 0.02**2) / (4 * (0.04**2 + 0.0008 + 0.02**2))
-    assert -cone.foot[2] == pytest.approx(height, rel=0.01)
-
-
 def test_a_line_makes_a_new_object(tmp_path: Path) -> None:
     path = tmp_path / "more.toml"
     path.write_text(BUILT_IN_OBJECTS.read_text("utf-8") + LINE, "utf-8")
