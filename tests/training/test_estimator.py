@@ -10,8 +10,6 @@ from holdfast import StabilityClassifier
 from holdfast.contact import STABLE
 from holdfast.detection import detect
 from holdfast.errors import TrainingError
-from holdfast.metrics import sample_metrics
-from holdfast.recordings import label_states
 from holdfast.training import Setting, train
 
 from .build import tiny_recording
@@ -68,20 +66,6 @@ def test_predictions_are_those_of_the_detector(grasps):
             np.testing.assert_allclose(
                 probability[finger][decided], trace.stable_probability[decided]
             )
-
-
-def test_the_score_is_the_accuracy(grasps):
-    estimator = StabilityClassifier(window=6).fit(grasps[:3])
-    labels, states, probability = [], [], []
-    for recording in grasps[3:]:
-        for finger, trace in detect(estimator.model_, recording).fingers.items():
-            labels.append(label_states(recording.modules[finger].labels, trace.times))
-            states.append(trace.state)
-            probability.append(trace.stable_probability)
-    expected = sample_metrics(*(np.concatenate(each) for each in (labels, states, probability)))
-    score = estimator.score(grasps[3:])
-    assert score == pytest.approx(expected.accuracy / 100)
-    assert 0 <= score <= 1
 
 
 def test_grid_search_with_groups(grasps):

@@ -87,12 +87,6 @@ class TestTraining:
         low, high = metrics.intervals.false_alarms_per_minute["held"]
         assert low <= metrics.pooled.false_alarms_per_minute["held"] <= high
 
-    def test_the_record_is_in_the_file(self, model, tmp_path):
-        model.save(tmp_path / "model.json")
-        loaded = Model.load(tmp_path / "model.json")
-        assert loaded.fingers == model.fingers
-        assert loaded.training.sliding_samples == {"*": 6 * 2 * 4 * 10}  # the first 0.1 s
-
     def test_samples_left_out_have_no_decision_and_no_truth(self, model, others):
         judged = compute_decisions(model, others[0])
         half = len(judged.fingers["thumb"].times) // 2
@@ -185,12 +179,6 @@ class TestNoRule:
         assert "need at least 1 min" in chosen.reason
         assert not chosen.metrics.threshold_chosen
 
-    def test_an_adapted_model_keeps_its_rule(self, model):
-        few = [tiny_recording(seed) for seed in (50, 51)]
-        adapted = train(few, Setting.adapting(model, trials=0)).model
-        assert set(adapted.fingers) == {"thumb", "index"}
-        assert all(part.slip == rule_of(model) for part in adapted.fingers.values())
-
     def test_an_adapted_model_without_a_rule_gets_none(self, grasps, recordings):
         plain = train(grasps, SETTING).model
         adapted = train(recordings, Setting.adapting(plain, trials=0)).model
@@ -210,23 +198,6 @@ class TestTuning:
         assert metrics.raised_quiet <= MAX_RAISED_QUIET
         assert metrics == tuned.chosen.slips
         assert slips_of(model, others) == tuned.before.slips
-
-    def test_the_model_keeps_how_it_was_tuned(self, model, others):
-        named = msgspec.structs.replace(model, name="mine")
-        tuned = tune(named, others, 5.0, "slip")
-        rule = rule_of(tuned.model)
-        assert tuned.model.name == "mine, tuned"
-        assert rule.threshold == tuned.chosen.threshold
-        assert rule.choice.requested == 5.0
-        assert rule.choice.recordings == {made.name: made.readings_digest for made in others}
-        assert rule.choice.found == tuned.chosen.slips.incipient["0.1"]
-        (before,), (after,) = (m.fingers.values() for m in (model, tuned.model))
-        assert after.stable == before.stable
-
-    @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
-    def test_a_rate_that_is_none(self, model, others, rate):
-        with pytest.raises(ValueError, match="false alarms"):
-            tune(model, others, rate, "slip")
 
     def test_a_model_without_a_rule(self, others):
         with pytest.raises(ModelError, match="slip rule"):

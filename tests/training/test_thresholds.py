@@ -51,19 +51,6 @@ def test_it_gives_the_states_of_the_detector(model, debounce, threshold):
     assert match_decisions(found) == match_decisions(expected)
 
 
-def test_a_lower_threshold_is_stable_more_often(model):
-    replay = ThresholdReplay.of(model, tiny_recording(21))
-    stable = [(replay.hand(p).states == STABLE).sum() for p in (0.999, 0.5, 0.001)]
-    assert stable == sorted(stable)
-    assert stable[0] < stable[-1]
-
-
-def test_the_threshold_is_that_of_all_fingers(model):
-    changed = model.with_threshold("stable", 0.25)
-    assert {part.stable.threshold for part in changed.fingers.values()} == {0.25}
-    assert changed.with_threshold("stable", 0.5).fingers.keys() == model.fingers.keys()
-
-
 # --- tune ------------------------------------------------------------------------------------
 
 
@@ -84,15 +71,6 @@ def test_the_detector_keeps_to_the_rate(model, others, wanted):
     assert events.n_events == tuned.chosen.events.n_events > 0
     assert events.missed == tuned.chosen.events.missed
     assert tuned.chosen.false_alarms == events.false_alarms_per_minute
-
-
-def test_no_other_threshold_shown_misses_less_for_that_rate(model, others):
-    tuned = tune(model, others, 40.0)
-    allowed = [point for point in tuned.points if point.false_alarms <= 40.0]
-    assert min(allowed, key=lambda point: point.cost(40.0)) == tuned.chosen
-    thresholds = [point.threshold for point in tuned.points]
-    assert thresholds == sorted(thresholds)
-    assert tuned.chosen.threshold in thresholds
 
 
 def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
@@ -336,13 +314,6 @@ def test_a_threshold_that_finds_hardly_a_slip_is_none(scores, silent):
     assert [x.probability for x in chosen.highest] == list(heights[:5])
     assert [x.time for x in chosen.highest] == pytest.approx([1.0, 6.0, 11.0, 16.0, 21.0], abs=0.05)
     assert ("thumb 1.00 s" in chosen.text()) is silent
-
-
-def test_handling_full_of_slips_leaves_the_head_silent():
-    slips = np.full(6000, 0.1)
-    slips[100::100] = 1.0
-    (chosen,) = slips_of(slips)
-    assert chosen.is_silent
 
 
 def test_each_form_of_zero_has_its_head():

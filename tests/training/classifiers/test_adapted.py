@@ -8,7 +8,6 @@ from sklearn.linear_model import LogisticRegression
 
 from holdfast.detection import Linear
 from holdfast.errors import TrainingError
-from holdfast.training.classifiers.fitting import Fitted
 from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS, Adapted, log_odds
 
 from .test_recipes import samples
@@ -125,35 +124,6 @@ def test_with_a_large_c_it_equals_scikit_learn(prior):
     expected = [peer.intercept_[0], *peer.coef_[0]]
     assert rule_of(found) == pytest.approx(expected, abs=1e-4)
     assert (found.mean, found.scale) == (prior.mean, prior.scale)
-
-
-def test_a_larger_c_moves_away_from_the_prior():
-    far = [np.linalg.norm(rule_of(adapted(C)) - odds_of(PRIOR)) for C in 10.0 ** np.arange(-7, 3)]
-    assert far[0] < 1e-3
-    assert far[-1] > 1.0
-    assert (np.diff(far) > 0).all()
-
-
-def test_probabilities_are_of_the_base_rate_and_the_threshold_stays():
-    given = samples(6000, share=0.15)
-    found = Adapted(UNLIKE, 0.2).fit(given, {"change": WEIGHTS, "C": 1.0}, 0)
-    assert found.probability(given.features).mean() == pytest.approx(0.15, abs=0.02)
-    assert found.threshold == 0.2
-    assert found == Fitted(adapted(1.0, given, UNLIKE), 0.2)
-
-
-def test_few_samples_help_a_prior_that_is_nearly_right():
-    """Forty samples, and a prior whose cut is off."""
-    world = samples(20_000, seed=7)
-    rule = adapted(1e3, world)
-    prior = msgspec.structs.replace(rule, intercepts=(rule.intercepts[0] + 2.0,))
-    few = samples(40, seed=8)
-    test = samples(4000, seed=9)
-
-    def right(found):
-        return (decided(found, test) == test.positive).mean()
-
-    assert right(adapted(0.1, few, prior)) > right(prior) + 0.02
 
 
 @pytest.mark.parametrize("stable", [True, False])

@@ -50,13 +50,6 @@ def test_far_from_the_boundary_it_is_certain():
     assert rule.probability([[1e9], [-1e9]]).tolist() == [1.0, 0.0]
 
 
-@pytest.mark.parametrize("kind", [np.float32, np.int64])
-def test_features_of_any_type(kind):
-    rule = Linear((0.0, 1.0), (1.0, 2.0), ((1.0, -1.0),), (0.2,))
-    features = np.arange(8).reshape(4, 2)
-    assert np.array_equal(rule.probability(features.astype(kind)), rule.probability(features))
-
-
 @pytest.mark.parametrize("shape", [(4, 1), (4, 3), (2,), (1, 4, 2)])
 @pytest.mark.parametrize("of", ["probability", "decision"])
 def test_refuses_other_shapes(shape, of):
