@@ -94,10 +94,6 @@ class TestTactile:
         with pytest.raises(RecordingError, match="overlap"):
             tactile(labels=labels)
 
-    def test_labels_need_samples(self):
-        with pytest.raises(RecordingError, match="without samples"):
-            tactile(n=0, labels=(Label(0, 1, ContactState.STABLE),))
-
     def test_labels_are_put_in_order(self):
         late, early = Label(0.05, 0.06, ContactState.STABLE), Label(0, 0.05, ContactState.UNSTABLE)
         assert tactile(labels=[late, early]).labels == (early, late)
@@ -204,12 +200,6 @@ class TestRecording:
         with pytest.raises(RecordingError, match="'one' has no samples"):
             Recording("one", modules)
 
-    def test_start_end_and_duration_are_over_all_modules(self):
-        late = tactile(times=0.05 + np.arange(10) / 100)
-        whole = recording(modules={"a": tactile(), "b": late, "c": tactile(n=0)})
-        assert (whole.start, whole.end) == (0, pytest.approx(0.14))
-        assert whole.duration == pytest.approx(0.14)
-
     def test_mappings_are_read_only(self):
         with pytest.raises(TypeError):
             recording().modules["finger1"] = tactile()
@@ -232,12 +222,6 @@ class TestRecording:
         assert labelled.digest == one.digest
         assert (
             recording(name="two", metadata={"object": "can"}, complete=False).digest == one.digest
-        )
-
-    def test_digest_does_not_depend_on_memory_layout(self):
-        readings = np.asfortranarray(tactile().readings)
-        assert recording(modules={"finger1": tactile(readings=readings)}).digest == (
-            recording().digest
         )
 
     @given(st.integers(0, 10 * 5 * 3 * 32 - 1))

@@ -17,7 +17,7 @@ from holdfast.resampling import (
     rows_per_update,
     true_updates,
 )
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import Sensor
 from holdfast.twin.simulation import Grasp, simulate
 from live import build
 
@@ -312,27 +312,6 @@ class TestSampleAndHold:
         updates = true_updates(mixed).modules
         assert updates["index"] is lively
         assert updates["thumb"].rate == pytest.approx(slow_rate, rel=0.12)
-
-    def test_zeros_between_true_readings_are_no_updates(self, grasp):
-        slow, held = slow_and_held(grasp, rows=3)
-        zeros = {}
-        for name, module in held.modules.items():
-            readings = np.array(module.readings)
-            readings[np.arange(len(readings)) % 3 != 0] = 0
-            zeros[name] = Tactile(module.sensor, module.times, readings)
-        updates = true_updates(Recording("zeros", zeros)).modules
-        for name, module in slow.modules.items():
-            assert np.array_equal(updates[name].times, module.times)
-            assert np.array_equal(updates[name].readings, module.readings)
-
-    @pytest.mark.parametrize("share", [0.05, 0.2])
-    def test_a_coarse_sensor_at_rest_is_not_slow(self, share):
-        """Less noise than a step: single taxels change, at random."""
-        changed = np.random.default_rng(0).random((2000, 16, 3)) < share / 48
-        readings = 500.0 + changed.cumsum(axis=0)
-        skin = sensor("uskin-4x4")
-        recording = Recording("rest", {"thumb": Tactile(skin, np.arange(2000) / 100, readings)})
-        assert true_updates(recording) is recording
 
     def test_a_module_that_does_not_hold_keeps_all_rows(self, grasp):
         _, held = slow_and_held(grasp)

@@ -94,14 +94,6 @@ def test_another_sensor_has_default_handling():
     assert model().handling_advice({"thumb": sensor()}) == ""
 
 
-def test_another_finger_has_default_handling():
-    fingers = {"thumb": CALIBRATED, "index": PART}
-    named = replace(model(), fingers=fingers, sensors={})
-    hand = {"thumb": sensor(), "index": sensor()}
-    assert named.handled_sensors == ("thumb (tiny)",)
-    assert named.without_handling(hand) == ["index (tiny)"]
-
-
 def states(estimates):
     return [(e.fingers["thumb"].stable_probability, e.fingers["thumb"].state) for e in estimates]
 

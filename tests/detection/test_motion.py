@@ -208,13 +208,6 @@ def test_a_stream_computes_only_the_families_that_it_needs():
     assert not stream_config(plan).lags["has_changes"].any()
 
 
-@pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
-def test_other_normals(normal):
-    given = replace(sensor("uskin-4x4"), normal=np.array(normal))
-    readings = walk(given, 60)
-    np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-6)
-
-
 def test_a_gap_begins_anew_but_the_load_stays():
     given = sensor("uskin-4x4")
     readings = walk(given, 120)

@@ -48,21 +48,6 @@ def test_saving_with_an_unknown_suffix(make_recording, tmp_path):
         save_recording(make_recording(), tmp_path / "a.h5")
 
 
-@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
-def test_step_and_rest_of_a_sensor_are_kept(make_recording, tmp_path, suffix):
-    recording = make_recording(150)
-    path = tmp_path / f"a.{suffix}"
-    save_recording(recording, path)  # without them
-    assert {m.sensor.step for m in load_recording(path).modules.values()} == {None}
-    modules = {
-        name: replace(module, sensor=replace(module.sensor, step=1.0, rests_at_zero=True))
-        for name, module in recording.modules.items()
-    }
-    save_recording(replace(recording, modules=modules), path, force=True)
-    for name, module in load_recording(path).modules.items():
-        assert module.sensor == modules[name].sensor
-
-
 def test_import_is_light():
     code = "import sys, holdfast.io; print({'pyarrow', 'mcap', 'h5py', 'scipy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

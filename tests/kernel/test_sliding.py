@@ -9,10 +9,8 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Tare
 from holdfast.detection.features import extract
-from holdfast.detection.kernel_config import stream_config
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
-    ANY_FEATURES,
     SLIDING_CHOICE,
     SLIDING_FEATURES,
     SLIDING_LAGS,
@@ -293,17 +291,6 @@ def test_signs_tell_a_press_from_a_pull_and_a_release(push, signs):
     specs = tuple(FeatureSpec(kind, transform="relative", seconds=0.1) for kind in signs)
     found = features_of(readings, np.arange(120) / RATE, sensor, specs=specs)[100]
     assert np.sign(np.round(found, 2)).tolist() == list(signs.values())
-
-
-def test_a_stream_computes_only_the_kinds_that_it_needs():
-    plan = StreamPlan(
-        {"a": made("uskin-4x4")}, {"a": SLIDING_CHOICE}, 14, Tare.parse("first"), RATE
-    )
-    config = stream_config(plan)
-    assert sum(int(kinds).bit_count() for kinds in config.lags["sliding"]) == len(SLIDING_CHOICE)
-    assert config.hand["n_slides"] == config.hand["n_track"] == 2 * round(0.533 * RATE) + 1
-    plan = replace(plan, features={"a": ANY_FEATURES})
-    assert stream_config(plan).hand["n_slides"] == 0
 
 
 def test_the_lists():

@@ -16,18 +16,6 @@ def columns(samples):
     return labels, states, np.where(states == UNKNOWN, np.nan, scores.astype(float))
 
 
-def test_rates_by_hand():
-    labels = [STABLE] * 5 + [UNSTABLE] * 3 + [NO_CONTACT] * 2
-    states = [STABLE] * 4 + [UNSTABLE] + [STABLE, UNSTABLE, NO_CONTACT] + [NO_CONTACT] * 2
-    scores = [0.9, 0.8, 0.7, 0.6, 0.4, 0.65, 0.3, 0.2, 0.1, 0.1]
-    metrics = sample_metrics(labels, states, scores)
-    assert metrics.confusion == [[4, 1], [1, 4]]
-    assert (metrics.n, metrics.accuracy) == (10, 80.0)
-    assert (metrics.fdr, metrics.fpr, metrics.fnr) == (20.0, 20.0, 20.0)
-    assert metrics.auc == 23 / 25
-    assert metrics.auc_contact == 13 / 15
-
-
 @given(st.lists(sample, min_size=2, max_size=60))
 def test_scikit_learn_agrees(samples):
     labels, states, scores = columns(samples)
@@ -93,13 +81,6 @@ def test_pooled_samples_equal_all_samples(samples, cut):
     assert (pooled.auc, pooled.auc_contact) == (whole.auc, whole.auc_contact)
     assert pooled.n_undecided == whole.n_undecided
     assert pooled.brier == (None if whole.brier is None else pytest.approx(whole.brier))
-
-
-@given(st.lists(sample, min_size=2, max_size=40))
-def test_scores_count_by_their_order_alone(samples):
-    labels, states, scores = columns(samples)
-    bent = sample_metrics(labels, states, scores**3)
-    assert bent.auc == sample_metrics(labels, states, scores).auc
 
 
 def test_calibration_sums_by_hand():

@@ -86,16 +86,6 @@ class TestFingerSlips:
     def test_no_slip_without_a_hold(self, change):
         assert finger_slips(truth(speeds((1, 0), (0.5, 4), (1, 0)), **change), "thumb") == ()
 
-    def test_a_shift_of_time_shifts_the_slips(self):
-        speed = speeds((1, 0), (0.2, 4), (1, 0), (0.3, 7), (0.5, 0))
-        first = truth(speed)
-        later = Truth(first.times + 5.0, dict(first.hand), dict(first.fingers))
-        for before, after in zip(
-            finger_slips(first, "thumb"), finger_slips(later, "thumb"), strict=True
-        ):
-            assert_allclose(np.array(after[:2]) - 5.0, before[:2])
-            assert_allclose(after.distance, before.distance)
-
 
 class TestSlipTruth:
     def test_codes_by_speed(self):

@@ -87,22 +87,6 @@ def test_a_dot_stands_at_the_accuracy_of_its_finger():
         assert sorted(drawn.get_offsets()[:, 0]) == pytest.approx(expected)
 
 
-def test_the_curve_of_the_hand_reaches_the_detected_fraction():
-    """Alarms 0.05 s late in four of five recordings, never in the fifth."""
-    decisions = example_decisions(4, delay=0.05)
-    silent = finger(9)
-    never = np.where(silent.states == UNKNOWN, UNKNOWN, STABLE)
-    score = np.where(silent.states == UNKNOWN, np.nan, 0.9)
-    deaf = FingerDecisions(silent.times, silent.labels, never, score)
-    decisions.append(Decisions.of("deaf", {"thumb": deaf, "index": deaf}, 2))
-    axes = draw(decisions).axes[3]
-    hand = max(axes.lines, key=lambda line: line.get_linewidth())
-    times, share = hand.get_data()
-    assert share[times < 0.049].max() == 0.0
-    assert share[-1] == pytest.approx(0.8)
-    assert axes.get_title(loc="left") == "alarms of the hand: 5 events, 0.0 false alarms/min"
-
-
 def test_calibration_by_hand():
     labels = np.array([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, STABLE])
     states = np.array([STABLE, STABLE, STABLE, NO_CONTACT, STABLE, UNKNOWN])

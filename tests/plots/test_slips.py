@@ -1,7 +1,6 @@
 """Panels about slips: what is drawn is what was counted and decided."""
 
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from msgspec.structs import replace as replace_fields
 from holdfast.detection import Model
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
-from holdfast.metrics.truth_labels import ORIGINS, Onsets
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.slips import draw_slips_found, slip_series
@@ -48,13 +46,6 @@ def test_the_share_found_over_time():
     times, shares = curves["gross"].get_data()
     assert float(shares[times <= 0][-1]) == 0.5  # 0.04 s after the onset is before the gross slip
     assert axes.get_xlim() == (-0.1, 0.3)
-
-
-@pytest.mark.parametrize("origin", get_args(Onsets))
-def test_slips_of_each_origin_are_drawn(origin):
-    made = [decisions(0.02, origin=origin)]
-    figure = draw_evaluation(summarise(made, n_resamples=10), made)
-    assert figure.axes[-2].get_title("left") == f"slips of fingers: 1 {ORIGINS[origin]}"
 
 
 def test_an_evaluation_has_two_panels_of_slips_only_if_they_are_scored():

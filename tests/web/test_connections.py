@@ -78,7 +78,10 @@ def test_connections_that_are_not_known():
 def test_the_limit_leaves_the_process_descriptors(monkeypatch, descriptors, total, each):
     monkeypatch.setattr(connections, "max_descriptors", lambda: descriptors)
     limit = ConnectionLimit.of_process()
-    assert (limit._max_total, limit._max_per_address) == (total, each)
+    assert sum(not wire.aborted for wire in filled(limit, total + 3)) == each
+    assert len(limit) == each
+    filled(limit, total, "10.0.0.2")
+    assert len(limit) == total
 
 
 def record(line=1, text="broken", error=None):

@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import pytest
 
+from holdfast.detection import Detector
 from holdfast.twin.hand import RATE
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
@@ -58,18 +59,17 @@ def test_trials_of_any_law_begin_alike(fixed):
     assert draw_trial(0).number == 0
 
 
-def test_samples_arrive_late_by_the_latency():
-    seen = {}
+def test_samples_arrive_late_by_the_latency(monkeypatch):
+    seen, update = {}, Detector.update
     for latency in (0, 4):
-        running = RunningTrial(replace(CAN, latency=latency), "fixed", "builtin:noise-floor")
-        monitor = running._detector
-        update, seen[latency] = monitor.update, []
+        log = seen[latency] = []
 
-        def record(samples, time, update=update, log=seen[latency]):
+        def record(detector, samples, time, log=log):
             log.append((time, samples["thumb"].copy()))
-            return update(samples, time)
+            return update(detector, samples, time)
 
-        monitor.update = record
+        monkeypatch.setattr(Detector, "update", record)
+        running = RunningTrial(replace(CAN, latency=latency), "fixed", "builtin:noise-floor")
         for _ in range(20):
             running.step()
     assert len(seen[4]) == len(seen[0]) - 4

@@ -1,11 +1,8 @@
 import re
 from dataclasses import replace
 
-import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause
 from holdfast.errors import RecordingError
@@ -13,7 +10,7 @@ from holdfast.io import import_recordings
 from holdfast.labelling.rules import tracking
 from holdfast.labelling.rules.poses import Poses, PoseTrack, in_sight
 from holdfast.labelling.rules.tracking import TrackingRule
-from holdfast.recordings import Recording, Truth, label_states
+from holdfast.recordings import Truth, label_states
 
 from .build import (
     CLOSING,
@@ -24,10 +21,7 @@ from .build import (
     RELEASE,
     check,
     clock,
-    drawn,
     grasp,
-    module,
-    moved,
     poses,
     slide,
     tracked,
@@ -67,15 +61,6 @@ def test_a_slip_is_an_interval_of_its_own_within_the_disturbance():
     assert all("poses: truth" in label.evidence for label in labels)
 
 
-def test_two_slips_in_one_disturbance_are_two():
-    times = clock()
-    moves = ((CLOSING, LOCKED), (PUSH, PUSH + 0.2), (PUSH + 0.4, PUSHED), (RELEASE, 9.5))
-    labels = tracking.propose(tracked(poses(times, slide(times, moves))))["thumb"]
-    check(labels, EDGE)
-    slips = slips_of(labels)
-    assert np.ravel(slips) == pytest.approx([PUSH, PUSH + 0.2, PUSH + 0.4, PUSHED], abs=0.02)
-
-
 def test_displacement_has_a_slip_only_while_the_object_moves():
     times = clock()
     away = slide(times, ((PUSH, PUSH + 0.3),), speed=0.03)
@@ -86,19 +71,6 @@ def test_displacement_has_a_slip_only_while_the_object_moves():
     assert (end, back) == (pytest.approx(PUSH + 0.3, abs=0.02), pytest.approx(PUSH + 1.3, abs=0.02))
     still = next(label for label in labels["thumb"] if label.start == end)
     assert (still.state.value, still.cause) == ("UNSTABLE", None)
-
-
-@given(rotation=st.integers(0, 2**31), shift=st.floats(-5, 5))
-@settings(max_examples=5)
-def test_another_frame_of_the_world_changes_nothing(rotation, shift):
-    turn = Rotation.random(rng=rotation)
-    times = clock()
-    tip = poses(times, 0 * times)
-    here = tracked(poses(times, slide(times, MOVES)), tip)
-    there = tracked(moved(poses(times, slide(times, MOVES)), turn, shift), moved(tip, turn, shift))
-    a, b = tracking.propose(here)["thumb"], tracking.propose(there)["thumb"]
-    assert [row[0] for row in drawn(a)] == [row[0] for row in drawn(b)]
-    assert [row[1] for row in drawn(a)] == pytest.approx([row[1] for row in drawn(b)], abs=0.011)
 
 
 def carried():
@@ -191,21 +163,6 @@ def test_another_clock_is_found(offset):
     assert (float(found[1]) if found else 0.0) == pytest.approx(offset, abs=0.05)
     given = tracking.propose(grasp(), tracking=other, offset=offset)["thumb"]
     assert [x.start for x in given] == pytest.approx([x.start for x in labels], abs=0.05)
-
-
-def test_unreliable_clocks_halve_the_confidence():
-    times = clock()
-    pose = poses(times, 0 * times, jitter=1e-4)
-    other = Poses("file", PoseTrack(times, pose[:, :3], pose[:, 3:]), same_clock=False)
-    free = {n: module(times, np.zeros((len(times), 3)), k) for k, n in enumerate(["thumb"])}
-    (label,) = tracking.propose(Recording("nothing", free), tracking=other)["thumb"]
-    assert label.confidence <= 0.5
-
-
-def test_labels_of_the_recording_are_ignored():
-    recording = sliding()
-    labels = tracking.propose(recording)
-    assert tracking.propose(recording.with_labels(labels)) == labels
 
 
 def test_a_finger_without_poses_has_no_labels():

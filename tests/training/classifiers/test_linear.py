@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Linear
 from holdfast.errors import ModelError
-from holdfast.kernel._extension import MAX_DEVIATION
+from holdfast.training.head_fits import MAX_DEVIATION
 
 numbers = st.floats(-1e3, 1e3)
 positive = st.floats(1e-2, 1e3)

@@ -3,9 +3,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
 
 from holdfast.devices.sources.xela.decoder import XelaDecoder
 from holdfast.devices.sources.xela.encoder import (
@@ -104,9 +101,6 @@ def test_the_counter_counts():
     encoder = XelaEncoder({"a": sensor("uskin-4x4")})
     numbers = [parsed(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(3)]
     assert numbers == [0, 1, 2]
-    encoder._counter = 2**32 - 1
-    numbers = [parsed(encoder, {"a": np.zeros((16, 3))})["message"] for _ in range(2)]
-    assert numbers == [2**32 - 1, 0]
 
 
 def test_a_sensor_without_a_sample_is_left_out():
@@ -156,18 +150,6 @@ class TestWholeHand:
 
 
 class TestReadings:
-    @given(arrays(np.float64, (16, 3), elements=st.floats(-0.49, 65535.49)))
-    def test_floats_are_rounded(self, readings):
-        encoder = XelaEncoder({"a": sensor("uskin-4x4")})
-        packet = parsed(encoder, {"a": readings})
-        assert packet["1"]["integer"] == [int(value) for value in np.rint(readings).ravel()]
-
-    @pytest.mark.parametrize("kind", [np.int16, np.int32, np.uint16, np.float32, ">u2"])
-    def test_number_types(self, kind):
-        readings = np.arange(48).reshape(16, 3).astype(kind)
-        packet = parsed(XelaEncoder({"a": sensor("uskin-4x4")}), {"a": readings})
-        assert packet["1"]["integer"] == list(range(48))
-
     @pytest.mark.parametrize(("wrong", "told_as"), [(-1, "-1 to 0"), (65536.0, "0 to 65536")])
     def test_what_is_no_count_is_refused(self, wrong, told_as):
         readings = np.zeros((16, 3), dtype=type(wrong))

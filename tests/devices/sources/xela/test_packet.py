@@ -1,6 +1,5 @@
 import json
 
-import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
@@ -88,17 +87,6 @@ def test_hexadecimal_digits_of_either_case(digits, values):
     assert readings({"data": data}).ravel().tolist() == values
     assert readings({"data": data, "integer": values}).ravel().tolist() == values
     assert readings({"integer": values}).ravel().tolist() == values
-
-
-def test_spaces_and_escapes_of_json_are_read():
-    raw = rb'{"data": "00\u0030A,fFfF,0003", "integer": [ 10 ,65535,  3], "other": {}}'
-    part = read_sensor(msgspec.Raw(raw), calibrated=False)
-    assert part.readings().tolist() == [[10, 65535, 3]]
-
-
-@pytest.mark.parametrize("part", [{}, {"data": None}, {"data": "", "integer": []}])
-def test_without_readings(part):
-    assert readings(part) is None
 
 
 def test_what_is_not_finite_is_missing():
