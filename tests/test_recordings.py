@@ -59,11 +59,6 @@ class TestLabel:
         with pytest.raises(ValueError, match="confidence"):
             Label(0, 1, ContactState.STABLE, confidence=confidence)
 
-    def test_plain_words_become_members(self):
-        label = Label(0, 1, "UNSTABLE", "slip")
-        assert label.state is ContactState.UNSTABLE
-        assert label.cause is Cause.SLIP
-
 
 class TestTactile:
     @pytest.mark.parametrize(
@@ -128,9 +123,6 @@ class TestTactile:
         assert given.rate == pytest.approx(100)
         assert given.n_gaps == 1  # four periods; three are none
         assert given.n_repeats == 5
-
-    def test_one_sample_has_the_rate_of_the_sensor(self):
-        assert tactile(n=1).rate == pytest.approx(SENSOR.rate)
 
     def test_no_samples(self):
         empty = tactile(n=0)

@@ -5,9 +5,7 @@ from hypothesis import strategies as st
 
 from holdfast.contact import ContactState
 from holdfast.detection import Model, detect
-from holdfast.devices.sources.base import Arrival
 from holdfast.errors import ModelError, StreamError
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import (
     Resampler,
@@ -19,7 +17,6 @@ from holdfast.resampling import (
 )
 from holdfast.sensors import Sensor
 from holdfast.twin.simulation import Grasp, simulate
-from live import build
 
 SENSOR = Sensor("one", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], 100.0)
 
@@ -261,24 +258,6 @@ class TestSampleAndHold:
             assert np.array_equal(
                 trace.stable_probability, estimated[finger].stable_probability, equal_nan=True
             )
-
-    def test_live_as_well(self, grasp):
-        slow, held = slow_and_held(grasp)
-        expected = detect(Model.load("builtin:any"), slow)
-        sensors = {name: m.sensor for name, m in held.modules.items()}
-        live = StreamDetector(Model.load("builtin:any"), build.Script(sensors))
-        states, notices = {}, []
-        times = next(iter(held.modules.values())).times
-        for k, time in enumerate(times.tolist()):
-            samples = {name: module.readings[k] for name, module in held.modules.items()}
-            update = live.update(Arrival(time, samples, time))
-            notices += update.arrival.notices
-            for result in update.estimates:
-                states[result.estimate.time] = result.estimate.state.code
-        assert live.rate == pytest.approx(50.0)
-        assert any("true updates are used, 50 Hz" in notice for notice in notices)
-        assert list(states) == expected.times.tolist()
-        assert np.mean(np.array(list(states.values())) == expected.hand) > 0.98
 
     @pytest.mark.parametrize(
         ("rate", "expected"), [(None, 50.0), (59.0, 50.0), (41.7, 50.0), (100.0, 100.0)]

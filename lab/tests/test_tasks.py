@@ -134,13 +134,6 @@ def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
     assert max(calls(log).values()) <= 2
 
 
-def test_other_arguments_or_another_function_are_another_result(tmp_path):
-    TaskRunner(tmp_path).run([Task("a", figure, (1, 7), Figure)])
-    TaskRunner(tmp_path).run([Task("a", figure, (1, 8), Figure)])
-    TaskRunner(tmp_path).run([Task("a", max, (1, 7), int)])
-    assert len(kept(tmp_path)) == 3
-
-
 def test_results_of_another_version_are_computed_again_and_one_line_says_so(
     tmp_path, log, monkeypatch
 ):
@@ -195,12 +188,6 @@ def test_a_damaged_result_is_computed_again(tmp_path):
     before, after = map(msgspec.msgpack.decode, (whole, path.read_bytes()))
     assert before | after == before | {"seconds": after["seconds"]}
     assert TaskRunner(tmp_path).seconds(tasks(1)) == after["seconds"] > 0
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_failure_names_its_task(tmp_path, engine):
-    with pytest.raises(ValueError, match="fail/2"):
-        TaskRunner(tmp_path, engine).run([Task("fail/2", fail, (2,), int)])
 
 
 @pytest.mark.parametrize(

@@ -111,14 +111,6 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
     assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "compiler", "level"),
-    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"), ("paper", "gcc", "-O0")],
-)
-def test_single_precision_has_no_hidden_conversion(name, compiler, level, tmp_path):
-    compiled(compiler, tmp_path, header_of(*made(name), single=True), level)
-
-
 @pytest.mark.parametrize("name", MODELS)
 def test_random_samples_give_the_same(name):
     model, sensors, rate = made(name)

@@ -305,14 +305,6 @@ class TestFingers:
             hand_model.fingers_of({"b": sensor(3, "big")})
 
 
-@pytest.mark.parametrize(
-    ("rate", "fits"), [(100, True), (81, True), (119, True), (79, False), (121, False)]
-)
-def test_a_rate_within_a_fifth_fits(rate, fits):
-    assert model().rate_fits(rate) is fits
-    assert Model(fingers={ANY_FINGER: finger_model()}).rate_fits(rate)
-
-
 class TestPredictProba:
     def test_a_number_for_each_sample(self):
         made = recording(thumb=tactile(150, seed=1), index=tactile(90, seed=2, start=0.002))

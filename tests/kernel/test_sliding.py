@@ -242,16 +242,6 @@ def test_equal_the_definitions_without_a_known_zero():
     assert (np.abs(found - known)[-60:, changes] > 0.1).any()  # the load is that which went
 
 
-@pytest.mark.parametrize("rate", [30.0, 150.0, 500.0])
-def test_equal_the_definitions_at_other_rates(rate):
-    sensor = made("uskin-curved")
-    readings, times = walk(sensor, 1, n=int(4 * rate), rate=rate, uneven=0.05)
-    np.testing.assert_allclose(
-        features_of(readings, times, sensor, rate), naive(readings, times, sensor, rate),
-        rtol=1e-9, atol=1e-9,
-    )  # fmt: skip
-
-
 def test_one_taxel_has_those_that_compare_none():
     sensor = made("one")
     specs = tuple(spec for spec in SLIDING_FEATURES if spec.min_taxels == 1)

@@ -93,12 +93,6 @@ def test_a_touched_hand_is_refused():
         health(turned, replace(PATCH, magnetic=False))
 
 
-def test_one_taxel_is_said():
-    one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
-    (text,) = changes_since(check("2026-11-26", index=health(open_hand()[:, :1], one)), None)
-    assert text.startswith("index has one taxel")
-
-
 def test_a_source_is_read_for_some_seconds(tmp_path):
     path = tmp_path / "open.parquet"
     save_recording(Recording("open", {"index": Tactile(PATCH, TIMES, open_hand())}), path)

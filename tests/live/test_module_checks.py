@@ -59,16 +59,6 @@ def test_two_fingers_of_one_grasp_are_not_alike():
     assert found(left=sum(press(0)), right=sum(press(1, 400.0))) == []
 
 
-def test_fingers_that_are_pressed_alike_are_no_cross_talk():
-    (load, noise), (_, other) = press(0), press(1)
-    assert found(left=load + noise, right=0.8 * load + other) == []
-
-
-def test_modules_that_rest_are_no_copies():
-    still = np.zeros((len(TIMES), 16, 3))
-    assert found(left=still, right=still) == []
-
-
 def drift_of(amplitude, times):
     drift = HoldDrift()
     for time, value in zip(times, amplitude, strict=True):

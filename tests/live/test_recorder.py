@@ -122,16 +122,6 @@ def test_markers_of_a_replayed_recording_are_recorded_as_markers(path):
     np.testing.assert_allclose([t for t, _ in got], [t for t, _ in want], atol=0.011)
 
 
-def test_recent_faults_are_those_of_the_last_second(path):
-    now = time.monotonic()
-    old = {"thumb": (Fault.LATE,), "elsewhere": (Fault.LATE,)}
-    new = {"index": (Fault.PACKET_GAP, Fault.LATE)}
-    with Recorder(path, TWO) as recorder:
-        recorder.put(notice_arrival(now - 1.5, faults=old))
-        recorder.put(notice_arrival(now + PATIENCE, faults=new))
-    assert recorder.status.recent_faults == {"index": (Fault.PACKET_GAP, Fault.LATE)}
-
-
 def test_the_same_notice_is_a_marker_once_a_second(path):
     with Recorder(path, TWO) as recorder:
         for k in range(250):
@@ -216,16 +206,6 @@ def test_a_slow_disk_delays_no_caller_and_fills_no_memory(path, monkeypatch):
     assert recording.modules["thumb"].readings[:, 0, 0].tolist() == [*range(51), 300]
     texts = [text for _, text in recording.markers]
     assert any("150 samples dropped" in text for text in texts)
-
-
-def test_a_closed_recorder_drops_arrivals(path):
-    with Recorder(path, TWO) as recorder:
-        recorder.put(arrival(0))
-    recorder.put(arrival(1), wait=True)
-    recorder.add_marker("late")
-    recorder.close()
-    assert recorder.status.n_dropped == 1
-    assert load_recording(path).modules["thumb"].n_samples == 1
 
 
 def test_an_existing_file_is_kept_unless_forced(path):

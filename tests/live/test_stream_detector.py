@@ -70,13 +70,6 @@ def test_arrivals_are_buffered_until_the_rate_is_known():
     assert detector.rate == pytest.approx(150.0)
 
 
-def test_a_source_that_ends_early_has_estimates_too():
-    recording = build.grasp()
-    _, estimates = detected(recording, steps=build.arrivals_of(recording)[:20])
-    assert len(estimates) == 20
-    assert estimates[-1].estimate.fingers["thumb"].reason is Reason.TARE
-
-
 def test_a_fault_of_the_transport_makes_its_finger_unknown_until_the_next_sample():
     recording = build.grasp()
     steps = build.arrivals_of(recording)
@@ -183,20 +176,6 @@ def test_tared_readings_begin_at_zero():
     assert all(np.abs(values).max() < 10 for values in tared.values())
 
 
-def test_ignored_taxels_cause_no_fault():
-    recording = build.grasp()
-    steps = build.arrivals_of(recording)
-    for k, arrival in enumerate(steps):
-        spoilt = arrival.samples["thumb"].copy()
-        spoilt[3] = 65535 if k > 300 else spoilt[3]
-        steps[k] = arrival._replace(samples={**arrival.samples, "thumb": spoilt})
-    _, spoilt = detected(recording, steps=list(steps))
-    assert spoilt[-1].estimate.fingers["thumb"].faults == (Fault.SATURATED,)
-    assert spoilt[-1].estimate.fingers["thumb"].faulty_taxels == (3,)
-    _, healthy = detected(recording, steps=list(steps), ignore={"thumb": (3,)})
-    assert healthy[-1].estimate.fingers["thumb"].faults == ()
-
-
 class NoticesOnly(build.Script):
     """Sends arrivals without samples, without end and without a pause."""
 
@@ -290,18 +269,6 @@ def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample(
     assert stream.rate == pytest.approx(60.0)
     assert np.median(np.diff(times)) == pytest.approx(1 / 150)
     assert len(times) > 2 * n_instants
-
-
-def test_events_are_the_changes_of_the_estimates():
-    stream = StreamDetector(build.model(), build.Script.of(build.grasp()))
-    updates = []
-    while not stream.source.ended:
-        updates.append(stream.read())
-    events = [event for update in updates for event in update.events if event.finger == "thumb"]
-    states = [one.estimate.fingers["thumb"].state for u in updates for one in u.estimates]
-    changed = [state for k, state in enumerate(states) if k and state is not states[k - 1]]
-    assert [event.state for event in events] == changed
-    assert events[0].previous is ContactState.UNKNOWN
 
 
 def test_changes_that_lasted_are_fewer_than_changes():

@@ -140,15 +140,6 @@ def test_without_samples_there_are_no_event_metrics():
         assert metrics.false_alarms_per_minute is None
 
 
-def test_a_label_holds_until_the_next_sample_however_late():
-    times = [0.0, 0.1, 0.2, 1.2, 1.3]
-    found = match_alarms(times, [S, S, S, F, F], [S, S, S, S, F])
-    (event,) = found.events
-    assert (event.onset, event.end) == (1.2, pytest.approx(1.4))
-    assert event.delay == pytest.approx(0.1)
-    assert found.stable_seconds == pytest.approx(1.2)
-
-
 def test_arguments_that_do_not_fit_are_refused():
     with pytest.raises(ValueError, match=r"labels \(1,\)"):
         event_metrics([0.0, 0.1], [S], [S, S])

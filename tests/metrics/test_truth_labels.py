@@ -137,12 +137,6 @@ def slipped_after_the_lock(rest):
     return truth(*GRASP, slip=[(start, start + 0.05, 0.01)])
 
 
-@pytest.mark.parametrize("rest", [0.0, 0.04, 0.15, 0.3])
-def test_a_short_gap_between_closing_and_the_first_slip_is_not_stable(rest):
-    rows = joined(label_rows(slipped_after_the_lock(rest)))
-    assert rows[1:3] == [(1.5, pytest.approx(2.25 + rest, abs=0.02), U), (rows[1][1], 5.0, S)]
-
-
 def test_a_longer_gap_between_closing_and_the_first_slip_is_stable():
     rows = joined(label_rows(slipped_after_the_lock(0.4)))
     assert [row[2] for row in rows] == [N, U, S, U, S, U, N]

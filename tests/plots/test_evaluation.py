@@ -78,15 +78,6 @@ def test_recordings_are_sorted_with_the_best_on_top():
     assert [label.get_text() for label in axes.get_yticklabels()] == ["late", "middling", "prompt"]
 
 
-def test_a_dot_stands_at_the_accuracy_of_its_finger():
-    decisions = example_decisions(3)
-    metrics = summarise(decisions, n_resamples=10)
-    dots = draw_evaluation(metrics, decisions).axes[0].collections
-    for name, drawn in zip(("thumb", "index"), dots, strict=True):
-        expected = sorted(each.fingers[name].accuracy for each in metrics.recordings)
-        assert sorted(drawn.get_offsets()[:, 0]) == pytest.approx(expected)
-
-
 def test_calibration_by_hand():
     labels = np.array([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, STABLE])
     states = np.array([STABLE, STABLE, STABLE, NO_CONTACT, STABLE, UNKNOWN])

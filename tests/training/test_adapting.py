@@ -145,21 +145,6 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
 # --- what is refused -------------------------------------------------------------------------
 
 
-def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
-    with pytest.raises(ModelError, match="thumb, index"):
-        Setting.adapting(by_finger(known), shared=True)
-
-
-def test_fingers_with_different_features(known):
-    own = by_finger(known)
-    other = parse_features("F_a,F_x,F_y,F_z,m,sigma", 10)
-    stable = msgspec.structs.replace(own.fingers["index"].stable, features=other)
-    part = own.fingers["index"].with_heads(stable)
-    unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
-    with pytest.raises(ModelError, match="features"):
-        Setting.adapting(unlike)
-
-
 def test_a_finger_that_the_model_lacks(known):
     own = [tiny_recording(seed, ("thumb", "ring")) for seed in (50, 51)]
     with pytest.raises(ModelError, match="'ring'"):

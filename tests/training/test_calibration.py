@@ -109,24 +109,6 @@ def test_labels_have_no_part_in_it(model, calibrated):
     assert (handling.location, handling.thresholds) == (usual.location, usual.thresholds)
 
 
-def scaled(recording, factor):
-    modules = {
-        name: Tactile(PAD, module.times, factor * np.array(module.readings))
-        for name, module in recording.modules.items()
-    }
-    return Recording(recording.name, modules)
-
-
-@pytest.mark.parametrize("factor", [8.0, 0.25, 3.7])
-def test_the_unit_of_the_readings_changes_nothing(model, calibrated, factor):
-    other = handling_of(calibrate(model, [scaled(recording, factor) for recording in DATA]))
-    handling = handling_of(calibrated.model)
-    assert other.location == pytest.approx(handling.location, abs=1e-8)
-    assert other.scale == pytest.approx(handling.scale, rel=1e-8)
-    assert other.thresholds.keys() == {"stable", "slip"}
-    assert other.thresholds == pytest.approx(handling.thresholds, rel=1e-12)
-
-
 def test_handling_of_several_sensors(model, calibrated):
     palm = handling_module(2, 12.0, sensor=CUP)
     hand = Recording("hand", {"thumb": handling_module(1, 12.0), "palm": palm})

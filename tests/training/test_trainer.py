@@ -249,12 +249,6 @@ def test_refusals(given, split, message):
         train(given, setting)
 
 
-def test_a_window_longer_than_the_data(grasps):
-    setting = replace(SETTING, window=1000, features=parse_features("sigma", 1000))
-    with pytest.raises(TrainingError, match="thumb"):
-        train(grasps, setting)
-
-
 def test_long_steps_report_progress(grasps):
     steps = []
 
@@ -270,10 +264,3 @@ def test_long_steps_report_progress(grasps):
         ("fitting", 6),
         ("evaluating", 6),
     ]
-
-
-def test_warn_of_many_undecided_samples(grasps, monkeypatch):
-    warnings = []
-    monkeypatch.setattr("holdfast.training.trainer.MAX_UNDECIDED_FRACTION", 0.0)
-    train(grasps, Setting(trials=0), warn=warnings.append)
-    assert len(warnings) == 1 and "--tare first" in warnings[0]

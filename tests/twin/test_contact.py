@@ -157,18 +157,6 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
     shaken(here, seed, 15, check)
 
 
-def test_a_fingertip_that_leaves_has_no_state() -> None:
-    grip = Grip(BOX)
-    grip.settle(0.2)
-    assert grip.state.bristles.any()
-    grip.bodies[0, 0] += 0.001  # off the face by a little: node by node
-    grip.bodies[1, 0] -= 0.2  # far away: at once
-    grip.bodies[0, 0] += 0.002
-    touch(grip.state, grip.constants, grip.bodies, grip.dt)
-    for part in grip.state:
-        assert not part.any()
-
-
 @pytest.mark.parametrize("name", [*NAMES, "coupled can"])
 def test_held_at_rest_without_creep(name: str) -> None:
     if name == "coupled can":

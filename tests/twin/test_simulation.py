@@ -177,17 +177,6 @@ class TestSeeds:
     def test_the_same_seed_gives_the_same_samples(self, held):
         assert made(Grasp("can", 1, 1)).digest == held.digest
 
-    def test_a_callback_changes_nothing(self, held):
-        seen = []
-        with pytest.MonkeyPatch.context() as patch:
-            quiet_hand = msgspec.structs.replace(SHORT, glitch_rate=0.0)
-            patch.setattr(simulation, "profile", lambda _: quiet_hand)
-            watched = simulate(
-                Grasp("can", 1, 1), on_sample=lambda world, command: seen.append(command.phase)
-            )
-        assert watched.digest == held.digest
-        assert seen == list(held.truth.hand["phase"])
-
 
 class TestLongHold:
     def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):

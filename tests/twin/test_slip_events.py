@@ -201,13 +201,3 @@ class TestSimulated:
         assert touched[inside].mean() > 0.6
         assert not touched[~inside].any()
         assert (phase[inside] == "slipping").any()
-
-    def test_the_fingers_carry_what_is_poured_in(self):
-        """Until it slides, the contact forces hold the object and what was added."""
-        recording = held("weight", name="ball", duration=1.5, distance=1.0)
-        poured = (since_lock(recording) > 1.5) & (since_lock(recording) < 2.4)
-        added = recording.truth.hand["added_mass"][poured]
-        assert added.max() == pytest.approx(0.2 * 1.4, rel=0.02)
-        upwards = sum(f["contact_force"][poured, 2] for f in recording.truth.fingers.values())
-        expected = (object_named("ball").mass + added) * GRAVITY
-        np.testing.assert_allclose(upwards, expected, rtol=0.03)

@@ -13,7 +13,6 @@ from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import (
     Uskin,
     UskinParameters,
-    kept_in_gaps,
     last_updates,
     taxel_shares,
     with_server_effects,
@@ -260,20 +259,6 @@ def test_fed_in_pieces_it_sends_the_same(pieces, seed, parameters):
     np.testing.assert_array_equal(np.concatenate(parts), whole)
 
 
-@pytest.mark.parametrize("n_averaged", [2, 6])
-def test_averaged_noise_has_its_own_floor_at_each_lag(n_averaged):
-    """A mean of N readings has the noise asked for, and grows with the root of the lag up to N."""
-    counts = tip(replace(IDEAL, noise_counts=3.0, n_averaged=n_averaged)).counts(
-        np.zeros((20000, 30, 3)), np.arange(20000) / RATE
-    )
-    values = counts[n_averaged:].astype(float)
-    assert values.std(axis=0).mean() == pytest.approx(3.0, rel=0.03)
-    for lag in range(1, n_averaged + 3):
-        change = np.sqrt(((values[lag:] - values[:-lag]) ** 2).mean() / 2)
-        expected = 3.0 * np.sqrt(min(lag, n_averaged) / n_averaged)
-        assert change == pytest.approx(expected, rel=0.04)
-
-
 @pytest.mark.parametrize("step", [1, 7])
 def test_readings_are_multiples_of_the_step(step):
     counts = tip(replace(REAL, noise_counts=9.0, step=step)).counts(
@@ -368,17 +353,6 @@ def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
     assert (np.arange(n) - shown < rows + 1).all()
     assert (np.diff(shown) >= 0).all()
     assert len(np.unique(shown)) == pytest.approx(n / rows, abs=2)
-
-
-def test_gaps_lose_all_rows_of_their_time():
-    times = np.arange(50_000) / 500
-    kept = kept_in_gaps(times, 0.5, (0.019, 0.025), np.random.default_rng(2))
-    gaps = np.diff(times[kept])
-    gaps = gaps[gaps > 1.5 / 500]
-    assert 30 <= len(gaps) <= 70
-    assert gaps.max() < 0.06
-    assert np.median(gaps) == pytest.approx(0.022 + 1 / 500, abs=0.002)
-    assert kept[[0, -1]].all()
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,8 @@
 import numpy as np
-import pytest
 
 from figures.drawing import drawn
 from holdfast.plots.style import PAPER
-from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_lines, draw_reliability
+from holdfast_lab.figures.curves import PlottedCurve, draw_alarms, draw_lines
 
 X = np.array([4.0, 8.0, 14.0])
 
@@ -37,11 +36,3 @@ def test_a_rate_of_zero_false_alarms_is_marked_zero():
     np.testing.assert_array_equal(line.get_ydata(), [np.nan, 40.0, 5.0])
     (chosen,) = (each for each in axes.lines if np.shape(each.get_xdata()) == (1,))
     assert (chosen.get_xdata()[0], chosen.get_ydata()[0]) == (0.5, 40.0)
-
-
-@pytest.mark.slow
-def test_reliability_shows_bins_and_sample_counts():
-    table = np.array([[0.1, 0.2, 30], [0.9, 0.8, 10]])
-    figure = drawn(draw_reliability({"a": table, "b": np.empty((0, 3))}, {"a": "Brier 0.1"}))
-    np.testing.assert_array_equal(figure.axes[0].lines[1].get_ydata(), table[:, 1])
-    np.testing.assert_allclose(figure.axes[1].lines[0].get_ydata(), [75.0, 25.0])

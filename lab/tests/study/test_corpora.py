@@ -38,15 +38,6 @@ def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
     assert left_out[0].startswith("real recordings")
 
 
-def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
-    (tmp_path / "here" / corpora.REAL_DATA).mkdir(parents=True)
-    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
-    corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)
-    assert corpus is None
-    assert left_out[0].startswith("real recordings")
-    assert "real recordings" in capsys.readouterr().err
-
-
 def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
     monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
     corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)

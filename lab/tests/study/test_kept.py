@@ -3,7 +3,7 @@
 import pytest
 
 from holdfast_lab.study.evaluation.recording_features import prepared_recordings
-from holdfast_lab.study.kept import KeptValues, usable_memory
+from holdfast_lab.study.kept import KeptValues
 from holdfast_lab.study.plan import scan_corpus
 
 from .example_recordings import save_synthetic
@@ -25,14 +25,6 @@ def test_what_does_not_fit_is_made_again_and_what_fits_stays():
     for key in "abcabc":
         kept.get(key, lambda key=key: made.append(key), one_byte)
     assert made == ["a", "b", "c", "c"]
-
-
-@pytest.mark.parametrize("text", ["max\n", "", str(1 << 60), "1048576\n"])
-def test_a_container_may_use_less_than_the_memory_of_the_machine(tmp_path, text):
-    limit = tmp_path / "memory.max"
-    limit.write_text(text)
-    expected = 1048576 if text == "1048576\n" else usable_memory(tmp_path / "none")
-    assert usable_memory(limit) == expected
 
 
 @pytest.fixture

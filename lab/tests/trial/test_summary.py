@@ -60,15 +60,6 @@ def test_a_rise_before_the_slip_is_no_reaction():
     assert summarize([lost])["n_reacting"] == 0
 
 
-def test_long_slips_and_drops_have_their_shares_and_reasons():
-    slips = [result(slip=slip) for slip in (0.001, 0.002, 0.004)]
-    lost = result(dropped=True, drop_reason="limit of force", slip=math.inf)
-    found = summarize([*slips, lost])
-    assert found["slipped_over_3mm"]["value"] == 50.0
-    assert found["slip_p90"]["value"] is None
-    assert found["drops"] == {"limit of force": 1}
-
-
 LOST = {"dropped": True, "slip": math.inf}
 NOTHING = {"value": None, "interval": None}
 

@@ -1,6 +1,6 @@
 import pytest
 
-from holdfast.cli.detect.output import json_lines, print_tables, watch
+from holdfast.cli.detect.output import json_lines, watch
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.demo_data import BOX_SLIPS
 from holdfast.detection import Detector, Model, detect
@@ -57,14 +57,6 @@ def test_a_finger_that_is_not_updated_has_no_line(live_estimates):
     (text,) = json_lines(chunk_from_stream("grasp", [one]))
     assert text.count("\n") == 1
     assert '"finger":"index"' in text
-
-
-def test_the_summary_of_a_source_without_samples(capsys):
-    summary = DetectionSummary()
-    summary.add(EstimateChunk("xela://auto", {}, []))
-    assert (summary.to_dict()["fingers"], summary.to_dict()["events"]) == ({}, [])
-    print_tables(summary.to_dict(), 0.0)
-    assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]
 
 
 def chunk(*states, hand=None, **fields):

@@ -20,7 +20,7 @@ from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import flat_sensor, sensor
+from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
@@ -352,13 +352,3 @@ def test_a_person_reads_no_times_since_1970(capsys, save):
     rows = capsys.readouterr().out.splitlines()
     start = next(k for k, row in enumerate(rows) if "1795364053.990 s" in row)
     assert 0 < float(rows[start + 2].split()[0]) < 12
-
-
-def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
-    rng = np.random.default_rng(0)
-    which = flat_sensor("single", 1, 1, 0.005, 100.0, "count")
-    module = Tactile(which, np.arange(100) / 100, np.rint(rng.normal(0, 4, size=(100, 1, 3))))
-    path = save(Recording("a", {"thumb": module}))
-    got, err = lines(capsys, "builtin:any", path)
-    assert len(got) == 100
-    assert err.startswith("thumb: single has 1 taxel, too few for residual, ")

@@ -3,11 +3,10 @@ from dataclasses import replace
 
 import pytest
 
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_recording
 from holdfast.recordings import Recording, Tactile
-from holdfast.synthetic import synthetic_recording
 
-from .helpers import FINGERS, refusal, run, run_json, save_manual_labels
+from .helpers import refusal, run, run_json, save_manual_labels
 
 
 def test_a_rule_labels_a_folder(capsys, folder):
@@ -107,12 +106,3 @@ def test_parameters_of_a_rule(capsys, folder):
     poses.write_text("time,x,y,z,qw,qx,qy,qz\n" + rows)
     found = run_json(capsys, "auto", "tracking", path, "--poses", poses)
     assert found["recordings"][0]["seconds"]["stable"] > 1
-
-
-def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
-    path = folder / "one.parquet"
-    save_labels(synthetic_recording("other", 5, FINGERS), path, author="rule:signal")
-    before = labels_path(path).read_bytes()
-    for words in (("auto", "signal", path), ("auto", "signal", path, "--force")):
-        assert "one.labels.json labels another recording" in refusal(capsys, *words)
-    assert labels_path(path).read_bytes() == before

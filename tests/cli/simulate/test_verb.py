@@ -63,19 +63,6 @@ def test_json_lists_the_recordings(capsys, out):
         assert recording.truth is not None
 
 
-def test_troubles_of_the_skins(capsys, out):
-    run(capsys, out, *ONE, "--faults", "zero-share=0.1, field=200")
-    recording = load_recording(out / "flask-case1-1.parquet")
-    assert recording.metadata["magnetic_faults"] == {
-        "field": 200.0, "turn_time": 8.0, "zero_share": 0.1, "drift": 0.0, "cross_talk": 0.0,
-        "invented_months": 0.0,
-    }  # fmt: skip
-    zeros = (recording.modules["thumb"].readings == 0).all(axis=2).any(axis=1)
-    assert 0.05 < zeros.mean() < 0.15
-    words = (*ONE, "--faults", "zero-share=0.1,field=200")
-    assert VERB.document(capsys, out, *words)["recordings"] == []
-
-
 def test_recordings_with_other_settings_are_replaced_by_force_only(capsys, out):
     run(capsys, out, *ONE)
     for words, text in (

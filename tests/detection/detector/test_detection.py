@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from holdfast.contact import SLIP_CODE, ContactState, Reason
 from holdfast.demo_data import BOX_SLIPS
-from holdfast.detection import ANY_FINGER, Debounce, Detector, Model, detect, fingertip_force
+from holdfast.detection import Debounce, Detector, Model, detect, fingertip_force
 from holdfast.errors import ModelError, StreamError
 from holdfast.io import load_recording
 from holdfast.metrics.masks import runs
@@ -25,7 +25,6 @@ from .build import (
     SLIP_OWN,
     TAXELS,
     broken,
-    finger_model,
     model,
     recording,
     sensor,
@@ -92,14 +91,6 @@ def test_detect_equals_update_over_many_chunks():
     made = recording(thumb=tactile(5000, seed=1), index=tactile(4000, seed=2, rate=71.0))
     hand_model = model()
     assert_same(detect(hand_model, made), list(feed(Detector(hand_model), made)))
-
-
-def test_detect_equals_update_without_a_rate():
-    which = sensor()
-    hand_model = Model(fingers={ANY_FINGER: finger_model(RICH, contact_noise=3.0)}, tare="0.2")
-    made = recording(finger1=tactile(seed=1, rate=80.0), finger2=tactile(seed=2, rate=80.0))
-    live = Detector(hand_model, {"finger1": which, "finger2": which}, rate=made.rate)
-    assert_same(detect(hand_model, made), list(feed(live, made)))
 
 
 @pytest.mark.parametrize("kind", [np.int16, np.uint16, np.float32, np.float64])
@@ -266,19 +257,6 @@ class TestSlip:
             assert (trace.slip_distance[~slides & ~unknown] == 0).all()
         assert n_slides > 1
         assert min(speeds) >= 0 and max(speeds) == 3 and len(speeds) > 10
-
-    def test_features_of_the_rule_do_not_change_the_rest(self):
-        made = recording(**CLOCKS["one clock"])
-        with_rule = model(features=RICH, threshold=20.0, slips=("index",), own=TAXELS)
-        plain = model(features=RICH, threshold=20.0)
-        one, two = detect(with_rule, made), detect(plain, made)
-        for name, trace in two.fingers.items():
-            found = one.fingers[name].stable_probability
-            assert np.isfinite(found).sum() > 30
-            assert np.array_equal(found, trace.stable_probability, equal_nan=True)
-        first, second = with_rule.predict_proba(made), plain.predict_proba(made)
-        for name, probability in second.items():
-            assert np.array_equal(first[name], probability, equal_nan=True)
 
     @pytest.mark.parametrize("clock", ["one clock", "two rates", "since 1970", "broken"])
     def test_the_decision_is_that_of_raised_at(self, clock):

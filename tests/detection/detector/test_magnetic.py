@@ -78,13 +78,6 @@ def test_a_press_of_all_taxels_alike_is_a_load():
     assert (trace.state[(times > 4.5) & (times < 8.9)] == STABLE).all()
 
 
-def test_a_shear_of_all_taxels_alike_is_lost():
-    """It cannot be told from a field."""
-    recording = turned((40, 0, 0), seconds=0.5)
-    trace, times = detect(ANY, recording).fingers["thumb"], recording.modules["thumb"].times
-    assert (trace.state[(times > 1) & (times < 8.9)] == NO_CONTACT).all()
-
-
 def shared(name, shares, *, grip=0.0, palm=True, field=(6, 12, 60)):
     """A hand that turns from 5 to 8 s, and may hold from 2 s on; its palm lies another way."""
     which, rng, times = sensor(name), np.random.default_rng(4), np.arange(1200) / 100
@@ -214,17 +207,6 @@ def test_a_jump_that_stays_is_accepted_at_the_second_sample():
     times, readings, _ = still_hold()
     readings[500:, 3, 0] += 500
     assert np.flatnonzero(estimates(times, readings).faults).tolist() == [500]
-
-
-def test_zeros_of_other_sensors_are_readings():
-    """A sensor with a dead band falls to zero when it is released."""
-    times, readings, _ = still_hold()
-    readings[500:, 3] = 0
-    which = sensor("anyskin")
-    other = type(which)(
-        "other", which.positions, which.rotations, which.normal, 100.0, magnetic=False
-    )
-    assert not (estimates(times, readings, other).faults >> list(Fault).index(Fault.INVALID)).any()
 
 
 def test_the_tare_takes_no_invalid_reading():

@@ -9,7 +9,7 @@ from holdfast.metrics.masks import runs as stretches_of
 from holdfast.recordings import Recording, Tactile
 from holdfast.twin.simulation import Grasp, simulate
 
-from .build import RATE, feed, model, runs, sensor
+from .build import RATE, feed, model, sensor
 
 NO_CONTACT, STABLE, UNKNOWN = (
     state.code for state in (ContactState.NO_CONTACT, ContactState.STABLE, ContactState.UNKNOWN)
@@ -190,13 +190,6 @@ class TestEstimates:
         )  # fmt: skip
         assert last.state is not ContactState.UNKNOWN
 
-    def test_a_finger_of_one_taxel_has_none_left(self):
-        values = noise(n_taxels=1)
-        values[300:310, 0, 0] = np.nan
-        found = self.estimates(values, sensor(1, "tip", limits=(0.0, LIMIT)))
-        assert {e.reason for e in found[300:310]} == {Reason.FAULT}
-        assert np.isnan([e.force for e in found[300:310]]).all()
-
     @pytest.mark.parametrize("tare", ["0.5", "first", "none"])
     def test_a_taxel_that_is_never_a_number(self, tare):
         values = noise()
@@ -207,16 +200,6 @@ class TestEstimates:
         assert {(e.faults, e.faulty_taxels) for e in found[wait:]} == {((Fault.NOT_FINITE,), (3,))}
         whole = self.estimates(np.delete(values, 3, axis=1), _without(TIP, 3), tare=tare)
         assert np.allclose(found[-1].force, whole[-1].force, atol=30.0)
-
-    def test_windows_hold_no_noise_of_a_noisy_taxel_after_it_is_masked(self):
-        values = noise()
-        values[300:500, 3] += np.rint(np.random.default_rng(9).normal(scale=2000.0, size=(200, 3)))
-        found = self.estimates(values)
-        first = next(k for k, e in enumerate(found) if e.faults)
-        (reason, wait), (after, _) = runs(found[first:500], lambda e: str(e.reason))
-        assert (reason, after) == ("warm_up", "")
-        assert 5 <= wait <= 10  # the window, and until the mask is complete
-        assert max(e.instability for e in found[first + wait : 500]) < 20.0
 
 
 def _without(which, taxel):

@@ -69,25 +69,6 @@ def test_garbage_gives_the_same_in_pieces_of_any_size(parts, piece):
     np.testing.assert_array_equal(whole[0][-28:], some(30, 2)[-28:])
 
 
-@given(st.binary(min_size=1, max_size=300))
-def test_garbage_loses_only_the_packet_that_it_joins(garbage):
-    given = some(6)
-    before, after = b"".join(map(packet, given[:3])), b"".join(map(packet, given[3:]))
-    samples, n_refused, _ = decoded(before + garbage + after)
-    np.testing.assert_array_equal(samples[:3], given[:3])
-    np.testing.assert_array_equal(samples[-2:], given[-2:])
-    assert 1 <= n_refused <= 2 + len(garbage) // 8
-
-
-def test_a_stream_from_the_middle_refuses_nothing():
-    given = some(5)
-    data = b"".join(map(packet, given))
-    for start in range(1, 83):
-        samples, n_refused, _ = decoded(data[start:], start=b"")
-        np.testing.assert_array_equal(samples, given[1:] if start < 82 else given[2:])
-        assert n_refused == 0
-
-
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 2e6, 1e-5])
 def test_impossible_numbers_are_refused(bad):
     given = some(4)

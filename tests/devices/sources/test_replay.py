@@ -109,16 +109,6 @@ def test_a_timeout_that_is_too_short_gives_none_and_loses_nothing(path, clock):
     assert max(clock.slept) <= 0.0071
 
 
-def test_markers_become_notices(tmp_path):
-    save_recording(hand(markers=((3.1, "closed"),)), tmp_path / "a.mcap")
-    with ReplaySource(tmp_path / "a.mcap", speed=0) as source:
-        arrivals = list(source)
-    (k,) = [k for k, arrival in enumerate(arrivals) if arrival.notices]
-    assert (arrivals[k].notices, arrivals[k].samples) == (("marker: closed",), {})
-    assert np.isnan(arrivals[k].time)
-    assert arrivals[k - 1].time <= 3.1 < arrivals[k + 1].time
-
-
 @pytest.mark.parametrize("speed", [0.0, 10.0])
 def test_time_continues_in_a_loop(path, clock, speed):
     with ReplaySource(path, speed=speed, loop=True) as source:

@@ -322,22 +322,6 @@ def test_a_baseline_that_was_subtracted_leaves_out_the_range(tmp_path):
     assert modules["a"]["finger1"].sensor == skin
 
 
-def test_records_are_ordered_by_their_ids(tmp_path):
-    order = np.random.default_rng(0).permuted(np.tile(np.arange(5), (N, 1)), axis=1)
-    records = (
-        {"t": t, "p": [{"id": int(k), **dict(zip("xyz", x[k], strict=True))} for k in ids]}
-        for t, x, ids in zip(TIMES.tolist(), READINGS.tolist(), order, strict=True)
-    )
-    check(imported(lines(tmp_path / "a", records), {"*": SKIN}), ALONE)
-
-
-def test_each_array_keeps_its_own_times(tmp_path):
-    arrays = {"l/F": READINGS, "l/t": TIMES, "r/F": READINGS[30:], "r/t": TIMES[30:]}
-    modules = imported(hdf5(tmp_path / "a", arrays), dict.fromkeys(("l/F", "r/F"), SKIN))["a"]
-    assert modules["r"].times[0] == pytest.approx(0.3)
-    np.testing.assert_array_equal(modules["r"].readings, modules["l"].readings[30:])
-
-
 def external_link(content, other):
     import h5py
 

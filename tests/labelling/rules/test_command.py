@@ -29,23 +29,6 @@ def test_markers_of_the_protocol():
         ]
 
 
-def test_case_order_and_other_words_do_not_matter():
-    other_words = (
-        (RELEASE, "OPENING the hand"),
-        (0.5, "mark 3"),
-        (CLOSING - 0.5, "Hand closing"),
-        (LOCKED, "  LOCKED!"),
-        (PUSH, "push from the left"),
-        (PUSHED, "End of disturbance"),
-        (5.0, "battery low"),
-    )
-    here, there = (
-        command.propose(grasp(markers=MARKERS)),
-        command.propose(grasp(markers=other_words)),
-    )
-    assert drawn(there["thumb"]) == drawn(here["thumb"])
-
-
 @pytest.mark.parametrize(
     ("text", "word"),
     [
@@ -71,11 +54,6 @@ def test_a_disturbance_without_an_end_has_less_confidence():
     open_end = command.propose(grasp(markers=again))["thumb"][3]
     assert (ended.start, ended.end) == (open_end.start, open_end.end)
     assert open_end.confidence < ended.confidence
-
-
-def test_the_delay_of_a_person_is_corrected():
-    late = tuple((time + 0.4, text) for time, text in MARKERS)
-    check(command.propose(grasp(markers=late), delay=0.4)["thumb"], EDGE)
 
 
 def test_nothing_is_labelled_before_a_first_marker_that_is_not_closing():

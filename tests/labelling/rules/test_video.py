@@ -194,21 +194,6 @@ def test_a_change_point_is_before_the_noise_is_left():
     assert np.std(errors) == pytest.approx(np.mean(spreads), rel=0.6)
 
 
-def test_slips_cut_held_labels_only():
-    made = (
-        Label(0, 1, "NO_CONTACT", author="rule:signal"),
-        Label(1, 2, "UNSTABLE", "closing", author="rule:signal"),
-        Label(2, 5, "STABLE", author="rule:signal"),
-    )
-    slip = video.SeenSlip(3.0, 0.01, 3.5, 0.001, 0.0001, 4.0)
-    early = slip._replace(onset=1.2, end=1.8)
-    cut = with_slips(made, [early, slip])
-    assert [(x.start, x.end, str(x.cause)) for x in cut] == [
-        (0, 1, "None"), (1, 2, "closing"), (2, 3, "None"), (3, 3.5, "slip"), (3.5, 5, "None"),
-    ]  # fmt: skip
-    assert with_slips(made, [])[:2] == made[:2]
-
-
 def stamped(tmp_path, film, lines):
     """A film of which a tenth of the pictures was lost, with no gap in the stamps of its file."""
     times, found = sticker_track()

@@ -8,7 +8,7 @@ import pytest
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import labels_path, load_labels, load_recording, save_labels
+from holdfast.io import labels_path, load_labels, load_recording
 from holdfast.io.label_files import label_bytes
 from holdfast.labelling.server import store
 from holdfast.labelling.server.store import (
@@ -63,15 +63,6 @@ def test_saved_labels_are_read_back(labelled):
     assert load_recording(path).modules["thumb"].labels == stored.labels["thumb"]
     assert load_recording(path).modules["index"].labels == ()
     assert load_labels(labels_path(path)).time == NOW
-
-
-def test_the_file_is_as_save_labels_writes_it(bare):
-    recording, path = bare
-    save(bare, {"thumb": [replace(HELD, author="ada")]})
-    own = labels_path(path).read_bytes()
-    labelled = recording.with_labels({"thumb": [replace(HELD, author="ada")]})
-    save_labels(labelled, path, author="ada", time=NOW, notes="nice", force=True)
-    assert labels_path(path).read_bytes() == own
 
 
 def test_labels_inside_and_none(labelled, bare):

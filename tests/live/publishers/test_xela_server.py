@@ -291,17 +291,6 @@ def test_readings_that_are_not_counts_end_the_server():
     assert str(server.failure).startswith("thumb: ")
 
 
-@pytest.mark.parametrize(
-    ("host", "expected"),
-    [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "127.0.0.1"), ("::1", "[::1]"), ("::", "127.0.0.1")],
-)
-def test_the_uri_of_the_server(host, expected):
-    with Made({"thumb": TIPS["thumb"]}) as source:
-        server = XelaServer(source, host=host, port=5001)
-        assert server.uri == f"xela://{expected}:5001?fingers=1:thumb"
-        assert not server.ended
-
-
 def test_the_end_waits_for_slow_clients(monkeypatch):
     behind = [1]
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: behind[0])

@@ -11,7 +11,7 @@ from holdfast_lab.study.comparison import (
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
-from holdfast_lab.study.methods import METHODS, RIVALS
+from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan
 from study.example_recordings import corpora_of, recording_with_truth, results_of, rows_of
 
@@ -96,27 +96,6 @@ def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables)
 def accuracy(metrics):
     right, n = np.array(list(correct_and_all(metrics).values())).sum(axis=0)
     return 100 * right / n
-
-
-def test_ours_beside_the_strongest_baseline(results, tables):
-    table = tables["strongest"]
-    assert {row.keys["on"] for row in table.rows} == {"unseen objects"}
-    (ratio,) = rows_of(
-        table,
-        error="samples of fingers [%]",
-        **{"left out": "nothing", "baseline of": "the paper's family"},
-        figure="ratio of errors",
-    )
-    errors = {
-        name: 100 - accuracy(results[f"methods/{name}"]["others"].fingers)
-        for name in ("logreg", "logreg_unweighted", "holdfast")
-    }
-    best = min(("logreg", "logreg_unweighted"), key=lambda name: errors[name])
-    assert ratio.keys["baseline"] == METHODS[best].title
-    assert ratio.ours == pytest.approx(errors[best] / errors["holdfast"])
-    low, high = ratio.interval
-    assert low <= ratio.ours and (high is None or ratio.ours <= high)
-    assert {row.keys["baseline"] for row in table.rows} <= {METHODS[name].title for name in RIVALS}
 
 
 def test_the_figures_can_be_drawn(plan, results):

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
+from holdfast.contact import STABLE, UNKNOWN, UNSTABLE
 from holdfast_lab.study.comparison.real_counts import (
     common_samples,
     count_pairs,
@@ -94,23 +94,6 @@ def test_a_method_without_any_estimate_takes_no_sample_away():
     assert found["right"]["accuracy [%]"] == 100.0
     assert found["never"]["without estimate [%]"] == 100.0
     assert found["never"]["AUC"] is found["never"]["accuracy [%]"] is None
-
-
-def test_no_contact_counts_as_not_stable_but_keeps_its_score():
-    codes = np.where(TIMES >= 2.0, NO_CONTACT, np.where(SLIP, UNSTABLE, STABLE))
-    states = np.where(TIMES < 0.5, NO_CONTACT, np.where(RIGHT > 0.5, STABLE, UNSTABLE))
-    (found,) = figures(labels(codes), one=estimates(RIGHT, states)).values()
-    assert found["AUC"] == 1.0
-    assert found["stable called STABLE [%]"] == pytest.approx(100 * (160 - 50) / 160)
-    assert found["accuracy [%]"] == pytest.approx(100 * (300 - 50 - 100) / 300)
-
-
-def test_only_slip_is_compared_with_stable():
-    """A disturbance from 2 s on counts in the accuracy; it is no slip."""
-    codes = np.where(SLIP | (TIMES >= 2.0), UNSTABLE, STABLE)
-    (found,) = figures(labels(codes), one=estimates(RIGHT)).values()
-    assert (found["AUC"], found["slips"]) == (1.0, 1.0)
-    assert found["accuracy [%]"] == pytest.approx(100 * 200 / 300)
 
 
 def test_false_alarms_are_those_under_a_stable_label():

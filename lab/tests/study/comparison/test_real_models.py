@@ -12,7 +12,6 @@ from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, compute_decisions, train
 from holdfast_lab.study.comparison import real_models
 from holdfast_lab.study.comparison.real_models import SHIPPED, model_estimates
-from holdfast_lab.study.comparison.real_recordings import MODELS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_all
 
@@ -67,18 +66,6 @@ def test_adapted_to_all_others_is_what_train_gives(corpus, recordings):
         same(found[index], train(others, setting).model, recording)
 
 
-def test_adapted_to_one_takes_one_with_both_classes(corpus, recordings, monkeypatch):
-    given = []
-    known = real_models.train
-    monkeypatch.setattr(
-        real_models, "train", lambda some, setting: given.append(some) or known(some, setting)
-    )
-    model_estimates("adapted to one", corpus, 0)
-    names = [[each.name for each in some] for some in given]
-    assert all(len(some) == 1 for some in names)
-    assert {"r1"} in map(set, names) and {"r0"} in map(set, names) and ["r2"] not in names
-
-
 def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypatch):
     def fail(*_):
         raise TrainingError("one class only")
@@ -90,23 +77,6 @@ def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypat
     for each in model_estimates("from nothing", corpus, 0):
         assert not each.known.array.any()
         assert np.isnan(each.fingers["finger1"].probability.array).all()
-
-
-def test_recordings_that_the_model_refuses_have_no_estimate(tmp_path):
-    """`builtin:any` is for 30 to 1000 Hz."""
-    slow = []
-    for seed in range(2):
-        recording = part(seed)
-        modules = {
-            name: replace(module, times=module.times[::10], readings=module.readings[::10],
-                          sensor=replace(module.sensor, rate=15.0))
-            for name, module in recording.modules.items()
-        }  # fmt: skip
-        slow.append(replace(recording, modules=modules))
-    corpus = scan_corpus("real", save_all(tmp_path / "real", slow), tare="first")
-    for making in MODELS:
-        for each in model_estimates(making, corpus, 0):
-            assert (each.hand.states.array == UNKNOWN).all() and not each.known.array.any()
 
 
 class TestHand:

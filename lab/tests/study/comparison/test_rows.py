@@ -5,7 +5,6 @@ import pytest
 
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast_lab.study.comparison.rows import (
-    calibration_row,
     correct_and_all,
     difference_row,
     quantile_row,
@@ -13,7 +12,6 @@ from holdfast_lab.study.comparison.rows import (
     ratio_row,
     sample_rows,
 )
-from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
 
 
 def metrics_of(*recordings):
@@ -72,16 +70,6 @@ def test_sample_rows_with_the_values_of_the_paper():
     assert (rows[0].ours, rows[0].paper, rows[0].n) == (75.0, 95.0, 2)
     assert rows[0].interval == pytest.approx((50.0, 100.0))
     assert rows[1].paper is None
-
-
-def test_the_calibration_error_by_hand():
-    """One bin is off by 0.1 on 30 samples, one by 0.2 on 10."""
-    table = [[0.0, 0.0, 0.0]] * 8 + [[24.0, 21.0, 30.0], [9.0, 7.0, 10.0]]
-    metrics = metrics_of(RIGHT)
-    evaluation = MethodEvaluation(None, metrics, [], [], [], [], [], [table])
-    assert calibration_row({}, evaluation, seed=0).ours == pytest.approx((3 + 2) / 40)
-    both = MethodEvaluation(None, metrics, [], [], [], [], [], [table, table])
-    assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))
 
 
 def test_a_quotient_of_error_shares_is_paired():

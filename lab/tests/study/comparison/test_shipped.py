@@ -7,7 +7,6 @@ from holdfast_lab.study.comparison.shipped import (
     ModelCounts,
     model_rows,
     shipped_counts,
-    silenced,
     tables,
     tasks,
     taught_counts,
@@ -37,18 +36,6 @@ def test_the_figures_of_a_model_by_hand():
     assert found["false alarms of the hand, per minute"] == pytest.approx(1.5)
     assert found["false slips of a finger, per minute"] == pytest.approx(1.5)
     assert found["false slips of the hand, per minute"] == pytest.approx(3.0)
-
-
-def test_doing_nothing_finds_nothing_and_gives_no_alarm():
-    found = values(model_rows({}, [silenced(COUNTS)]))
-    assert found["stable called STABLE [%]"] == 100
-    assert found["events missed at 50 ms [%]"] == 100
-    assert found["slips"] == 4
-    rest = ("unstable or open, not STABLE [%]", "slips found within 0.1 s [%]",
-            "before 1 mm [%]",
-            "false alarms of the hand, per minute",
-            "false slips of the hand, per minute")  # fmt: skip
-    assert [found[name] for name in rest] == [0, 0, 0, 0, 0]
 
 
 @pytest.mark.slow

@@ -130,17 +130,3 @@ def test_the_highest_threshold_with_few_enough_false_alarms(seed, per_minute):
     quiet, most_alarms = brute_shift(pairs, per_minute, tried)
     chosen = threshold_shift([FalseAlarmRanges.of(s, labels_of(y)) for s, y in pairs], per_minute)
     assert max(chosen, tried[0]) == max(min(quiet, most_alarms), tried[0])
-
-
-def test_samples_that_are_left_out_count_neither_as_alarms_nor_as_time():
-    """Of 3000 samples at 150 Hz, all labelled stable, the first half is left out."""
-    score, _ = cases(0)[0]
-    labels = np.full(3000, STABLE, dtype=np.int8)
-    none, first = np.zeros(3000, dtype=bool), np.arange(3000) < 1500
-    every, late = (
-        FalseAlarmRanges.of(score, AlarmLabels(labels, none, left_out))
-        for left_out in (none, first)
-    )
-    assert every.minutes == pytest.approx(20 / 60)
-    assert late.minutes == pytest.approx(10 / 60)
-    assert 0 < len(late.lower) < len(every.lower)

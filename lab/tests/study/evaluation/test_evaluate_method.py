@@ -5,19 +5,15 @@ import numpy as np
 import pytest
 
 from holdfast.contact import UNKNOWN, ContactState
-from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
 from holdfast_lab.study.evaluation.evaluate_method import (
-    OWN,
     EvaluationEffort,
     EvaluationJob,
     MethodEvaluation,
     evaluate_method,
     held_out_folds,
     score_splits,
-    warm_up,
 )
-from holdfast_lab.study.evaluation.recording_features import label_hand
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
@@ -110,18 +106,6 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
     assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
-def test_events_are_counted_by_exact_labels(evaluations, corpus):
-    """Equal to `event_metrics` of the hand, by labels without margin."""
-    _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
-    for case, alarms in zip(scored, evaluations["recording"].alarms[OWN], strict=True):
-        labels = label_hand(case.recording.times, case.recording.exact_labels).labels
-        score = case.hand
-        known = event_metrics(score.times, labels, score.states())
-        assert len(alarms.delays) == known.n_events
-        assert alarms.n_under_stable == known.false_alarms["STABLE"]
-        assert alarms.n_false_alarms == sum(known.false_alarms.values())
-
-
 def test_a_whole_hand_method_has_no_fingers(corpus):
     found = evaluate_method(EvaluationJob("jl_global_logreg", corpus, effort=EFFORT))["recording"]
     assert found.fingers is None
@@ -147,11 +131,3 @@ def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
     ):
         assert n == n_paper
         assert n_without < n_without_paper
-
-
-@pytest.mark.parametrize(
-    ("method", "samples"),
-    [("friction", 0), ("difference", 1), ("logreg", 13), ("spectrum", 29)],
-)
-def test_the_history_of_a_method_in_samples(method, samples):
-    assert warm_up(method, 150.0) == pytest.approx(samples / 150)

@@ -5,7 +5,7 @@ import pytest
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
 from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
-from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
+from holdfast.metrics.slip_truth import CREEPING, SLIDING, STILL, Slip, SlipTruth
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
@@ -18,7 +18,7 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import MethodTraining, probability_of
+from holdfast_lab.study.evaluation.fitted_method import probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -52,30 +52,11 @@ def test_the_truth_is_that_of_each_finger(recordings):
     assert not truth["index"].quiet[inside([(5.4, 6.4)], times)].any()
 
 
-def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
-    """A stretch begins after the tare of 0.5 s."""
-    (recording, _) = corpus_features(METHODS["difference"], corpus, warm_up=5.3)
-    times = recording.times["thumb"]
-    known = recording.slips["thumb"].codes != NOT_HELD
-    assert not known[times < 5.79].any() and known[(times > 5.81) & (times < 9)].all()
-    (slip,) = recording.slips["thumb"].slips
-    assert slip.onset == pytest.approx(SLIPS[1][0])
-
-
 def test_a_hand_slides_if_one_of_its_fingers_slides(recordings):
     labels = recordings[0].slip_labels(HAND)
     times = recordings[0].times["thumb"]
     np.testing.assert_array_equal(labels == UNSTABLE, inside(SLIPS, times))
     assert ((labels == UNKNOWN) == ~inside([(2.3, 9.5)], times)).all()
-
-
-def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
-    training = MethodTraining.of(METHODS["difference"], recordings, 200, sliding=True)
-    thumb = training.samples["thumb"]
-    n_sliding = sum(int((r.slips["thumb"].codes == SLIDING).sum()) for r in recordings)
-    assert (~thumb.positive).sum() == n_sliding
-    assert 100 < thumb.positive.sum() <= 200
-    assert training.samples["index"].one_class
 
 
 def test_scores_are_smoothed_as_by_the_rule_of_a_model():

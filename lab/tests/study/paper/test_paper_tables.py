@@ -61,21 +61,6 @@ def test_values_of_the_paper_are_beside_ours(quick, name, keys, values):
     assert {row.paper for row in rows_of(quick[name], **keys)} == values
 
 
-def test_one_classifier_has_the_same_values_in_every_table(quick):
-    def figure(table, **keys):
-        (row,) = rows_of(quick[table], on="held out", figure="accuracy", **keys)
-        return row.ours
-
-    shared = figure("confusion", classifier="LogReg")
-    assert figure("window", features="deployed", N_w=14) == shared
-    assert figure("ablation", features="F_a, F_tip, sigma", N_w=14) == shared
-    assert figure("fingers", finger="index", classifier="LogReg") == shared
-    assert figure("zhang", method="LogReg (the paper)", N_w=14) == shared
-    assert figure("window", features="all six", N_w=18) == figure(
-        "ablation", features="F_a, F_tip, m, sigma", N_w=18
-    )
-
-
 def test_each_classifier_is_fitted_once():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("thumb", "index"), 150.0)
     kinds = [

@@ -4,7 +4,7 @@ import pytest
 from holdfast.contact import STABLE, UNKNOWN
 from holdfast.detection import fingertip_force, haar_features
 from holdfast.synthetic import synthetic_recording
-from holdfast_lab.study.paper.pooled_samples import COLUMNS, pool_samples
+from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_all, save_synthetic
 
@@ -24,14 +24,6 @@ def test_features_and_classes_are_those_of_each_recording(corpus):
         mine = pool.samples.groups == index
         assert np.array_equal(pool.samples.features[mine, :6], features[known])
         assert np.array_equal(pool.samples.positive[mine], module.label_states[known] == STABLE)
-
-
-def test_energy_is_the_sum_of_squared_details_of_the_normal_force(corpus):
-    pool = pool_samples(corpus, corpus.rate, "index", 4, seed=0)
-    x = pool.samples.features[pool.samples.groups == 0, COLUMNS.index("F_x")]
-    k = 700
-    details = (x[k - 3] - x[k - 2]) ** 2 / 2 + (x[k - 1] - x[k]) ** 2 / 2
-    assert pool.select(["energy"]).features[k, 0] == pytest.approx(details)
 
 
 def test_parts_do_not_depend_on_the_window_or_the_finger(corpus):

@@ -14,10 +14,8 @@ from holdfast_lab.study.paper.random_split import (
     UNSEEN_OBJECTS,
     VALIDATED,
     FitBudget,
-    FixedWeights,
     evaluate_variants,
     rate_rows,
-    search,
 )
 from study.example_recordings import corpora_of
 
@@ -98,38 +96,6 @@ def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):
 def test_a_fit_has_a_maximum_number_of_samples(corpora):
     cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(1, 500))[0]
     assert 400 < cell.n_fitted <= 500
-
-
-@pytest.mark.parametrize("name", ["logreg", "svm"])
-def test_the_search_takes_the_fewest_errors_of_its_trials(name):
-    """Counted from the definition for every C that was drawn, the reference among them."""
-    rng = np.random.default_rng(0)
-    positive, groups = rng.random(200) < 0.4, np.arange(200) % 4
-    features = rng.normal(size=(200, 3)) + 0.6 * positive[:, None]
-    samples = Samples(features, positive, np.zeros(200, dtype=int))
-    drawn, folds, recipe = [], [groups == k for k in range(4)], FixedWeights(name, None)
-    fit = type(recipe.recipe).fit
-
-    def noted(self, samples, parameters, seed):
-        drawn.append(parameters)
-        return fit(self, samples, parameters, seed)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(type(recipe.recipe), "fit", noted)
-        best = search(samples, folds, recipe, 6, 0)
-    tried = drawn[::4]
-    assert tried[0] == recipe.reference
-    assert len({parameters["C"] for parameters in tried}) == 6
-
-    def n_wrong(parameters):
-        fits = [(recipe.fit(samples.take(~held), parameters, 0), held) for held in folds]
-        return sum(
-            ((rule.probability(features[held]) >= rule.threshold) != positive[held]).sum()
-            for rule, held in fits
-        )
-
-    assert best in tried
-    assert n_wrong(best) == min(map(n_wrong, tried))
 
 
 def test_rates_by_hand():

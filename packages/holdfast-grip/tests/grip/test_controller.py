@@ -129,26 +129,6 @@ class TestStart:
             estimate = hand(k / RATE, state, **fingers)
             assert controller.update(estimate, k / RATE).state is LoopState.IDLE
 
-    @pytest.mark.parametrize(
-        ("finger", "normal", "begins"),
-        [("ring", 30.0, True), ("ring", 1000.0, True), ("thumb", 3000.0, False)],
-    )
-    def test_a_finger_that_carries_little_does_not_block_it(self, finger, normal, begins):
-        """The thumb carries half of all normal forces, the ring finger a sixth."""
-        controller = GripController(Limits())
-        restless = {finger: {"state": ContactState.UNSTABLE, "normal": normal}}
-        for k in range(170):
-            controller.update(hand(k / RATE, ContactState.UNSTABLE, **restless), k / RATE)
-        assert (controller.state is not LoopState.IDLE) == begins
-        assert ("ring" in controller.loaded_fingers) == begins
-
-    def test_a_finger_without_an_estimate_blocks_it(self):
-        controller = GripController(Limits())
-        unknown = {"index": {"state": ContactState.UNKNOWN}}
-        for k in range(170):
-            controller.update(hand(k / RATE, ContactState.UNSTABLE, **unknown), k / RATE)
-        assert controller.state is LoopState.IDLE
-
     def test_a_new_grip_presses_more_within_the_limits_until_the_object_rests(self):
         """Only with a slip rule, by which it may begin before a person lets go."""
         controller, time = holding(changes=NO_SLIP, rise=2.0)
@@ -255,14 +235,6 @@ class TestFaults:
         commands, _ = run(controller, time, 2.0)
         assert commands[-1].state is LoopState.FAULT
 
-    def test_a_lasting_fault_replaces_one_that_ends_by_itself(self):
-        controller, time = holding(recovery=0.5)
-        assert controller.update(hand(time), time + 0.2).reason is GripReason.STALE
-        commands, time = run(controller, time + 0.2, 0.1, **GONE)
-        assert commands[-1].reason is GripReason.LOST
-        commands, _ = run(controller, time, 2.0)
-        assert (commands[-1].state, commands[-1].reason) == (LoopState.FAULT, GripReason.LOST)
-
     def test_hold_recovers_after_valid_data_and_open_does_not(self):
         for on_fault, after in (("hold", LoopState.HOLD), ("open", LoopState.FAULT)):
             controller, time = holding(on_fault=on_fault, recovery=0.5)
@@ -271,12 +243,6 @@ class TestFaults:
             assert commands[-1].state is LoopState.FAULT
             commands, _ = run(controller, time + 0.65, 0.2)
             assert commands[-1].state is after
-
-    def test_nothing_moves_in_a_fault(self):
-        controller, time = holding()
-        controller.update(hand(time), time + 0.2)
-        commands, _ = run(controller, time + 0.2, 0.3, **SLIPPING)
-        assert all({one.scale for one in c.fingers.values()} == {1.0} for c in commands)
 
     @pytest.mark.parametrize(
         ("moved", "state", "reason"),
@@ -374,12 +340,6 @@ class TestFrozenReadings:
         for n in range(300):
             command = controller.update(lively(k + n, rest), (k + n) / RATE)
             assert command.state is not LoopState.FAULT
-
-    def test_without_a_free_sensor_before_the_grip_nothing_is_known(self):
-        controller, k = self.held(noisy, n_free=0)
-        for n in range(100):
-            command = controller.update(lively(k + n, lambda k: 0.0), (k + n) / RATE)
-        assert command.state is LoopState.HOLD
 
 
 def test_a_fault_that_was_reported_holds_for_one_update():

@@ -75,24 +75,6 @@ def test_from_the_registry_to_recordings(capsys, made_up, cache):
     assert made_up.requests == ["made-up/one.csv", "made-up/two.csv"]
 
 
-def test_the_command_that_is_printed(capsys, made_up):
-    code, _, err = VERB.run(capsys, "get", "made-up")
-    assert code == 0
-    command = err.rpartition("next: holdfast ")[2].split()
-    assert main(command) == 0
-
-
-def test_only_some_files(capsys, made_up):
-    document = document_of(capsys, "get", "made-up", "a", "--only", "*two*")
-    assert [recording["name"] for recording in document["recordings"]] == ["two"]
-    VERB.run(capsys, "get", "made-up", "b")
-    document = document_of(capsys, "get", "made-up", "c", "--only", "one.csv")
-    assert [recording["name"] for recording in document["recordings"]] == ["one"]
-    assert len(made_up.requests) == 2
-    for words in (["--only", "three"], ["--with-checksum"]):
-        assert "one.csv" in refused(capsys, "get", "made-up", "d", *words)
-
-
 def test_a_mirror(capsys, made_up, monkeypatch):
     elsewhere = msgspec.structs.replace(made_up.public, address="https://127.0.0.1:9/")
     monkeypatch.setitem(public_sets(), "made-up", elsewhere)

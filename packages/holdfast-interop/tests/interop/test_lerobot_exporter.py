@@ -82,17 +82,6 @@ def test_columns_have_the_types_and_shapes_of_the_features(info, table):
         ) == feature["dtype"]  # fmt: skip
 
 
-def test_counters_run_on_and_times_are_those_of_frames(table):
-    assert column(table, "index").tolist() == list(range(692))
-    episodes = column(table, "episode_index")
-    for episode, n in ((0, 346), (1, 346)):
-        frames = column(table, "frame_index")[episodes == episode]
-        assert frames.tolist() == list(range(n))
-        stamps = column(table, "timestamp")[episodes == episode]
-        assert np.abs(stamps - frames / 30).max() < 1e-5
-    assert (column(table, "task_index") == episodes).all()
-
-
 def test_an_episode_is_a_row_group_and_says_where_it_is(data_set):
     file = pq.ParquetFile(data_set / DATA)
     assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [346, 346]
@@ -121,12 +110,6 @@ def test_a_frame_has_the_newest_samples_up_to_it(recordings, table):
         rows = np.maximum(np.arange(last - 5, last), 0)
         assert times[frame].tolist() == index.times[rows].tolist()
         assert values[frame].tolist() == index.readings[rows].tolist()
-
-
-def test_labels_are_those_of_the_newest_sample(recordings, table):
-    states = recordings[0].modules["thumb"].label_states
-    new = column(table, "observation.tactile.thumb.new")[:346]
-    assert column(table, "label.thumb")[:346].tolist() == states[np.cumsum(new) - 1].tolist()
 
 
 def test_statistics_are_those_of_the_frames_without_nan(data_set, info, table):

@@ -1,7 +1,6 @@
 """What Rerun shows of a recording: arrows, frames, series and events."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,7 +16,7 @@ from holdfast_interop.scene.taxel_arrows import (
     module_forces,
     scene_instants,
 )
-from holdfast_interop.scene.tracks import events, series, state_codes
+from holdfast_interop.scene.tracks import series, state_codes
 
 
 @pytest.fixture(scope="module")
@@ -61,18 +60,6 @@ def test_arrows_have_the_states_of_estimates_or_else_of_labels(grasp, traces):
         found = [state_codes(grasp, given)[name][1] for given in (traces, {})]
         for codes, expected in zip(found, (traces[name].state, module.label_states), strict=True):
             np.testing.assert_array_equal(codes, expected)
-
-
-def test_alarms_are_those_of_the_detector(grasp, traces):
-    state = traces["index"].state
-    n_alarms = sum(before == 3 and now not in (0, 3) for before, now in pairwise(state))
-    log = events(grasp, traces)
-    assert [event.time for event in log] == sorted(event.time for event in log)
-    alarms = [x for x in log if x.name == "index" and x.text.startswith("alarm")]
-    assert len(alarms) == n_alarms > 0
-    assert all(alarm.is_warning and "was STABLE" in alarm.text for alarm in alarms)
-    (marker,) = [event for event in log if event.name == "marker"]
-    assert (marker.text, marker.time) == ("grasped", 2.5)
 
 
 def test_an_arrow_points_along_the_reading():

@@ -193,17 +193,6 @@ def test_pillars_with_a_clock_that_is_none(tmp_path, tus):
     assert recording.modules["finger1"].n_samples == len(tus)
 
 
-def test_clocks_of_two_devices_are_not_mixed(tmp_path):
-    with BagWriter(tmp_path / "both", "mcap", "p", PILLARS | XELA) as given:
-        for k in range(N):
-            time = EPOCH + 0.01 * k
-            write_pillars(given, "/hub_0/sensor_0", time, 1000 * (k + 1), np.ones((9, 3)))
-            given.xela(time + 0.001, (1, "uSPa44", k, time, counts(16, k), []))
-    recording = read(given.path)
-    assert recording.metadata["clock"] == "bag"
-    assert list(recording.modules) == ["finger1", "xServTopic/finger1"]
-
-
 def test_pillars_of_ros2_before_definitions_were_stored(tmp_path):
     forces = np.random.default_rng(0).normal(size=(N, 9, 3)).astype(np.float32)
     with BagWriter(tmp_path / "pillars", "sqlite3", "sensor_interfaces", PILLARS_OF_ROS2) as given:

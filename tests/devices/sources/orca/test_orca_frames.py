@@ -92,16 +92,6 @@ def test_no_bytes_stop_it(noise):
     np.testing.assert_array_equal(samples[-6:], FORCES)
 
 
-def test_a_stream_that_runs_already_is_joined_without_counting():
-    client = OrcaClient()
-    samples = []
-    for k in range(60):
-        samples += client.feed(FRAMES[k % 6][700:] + FRAMES[(k + 1) % 6][:700], 0.01 * k)[0]
-        if request := client.request(0.01 * k):
-            assert client.feed(answer(request), 0.01 * k) == ([], 0, 0)
-    assert len(samples) > 50
-
-
 def test_the_stream_is_requested_again_after_2_s_of_silence():
     client = begun(now=10.0)
     client.feed(FRAMES[0], 11.0)

@@ -134,17 +134,6 @@ class TestWholeHand:
         for name, readings in (first | thumb).items():
             np.testing.assert_array_equal(arrival.samples[name], readings)
 
-    @pytest.mark.parametrize(
-        ("sensors", "text"),
-        [
-            ({"finger1": sensor("uskin-curved")}, "finger1"),
-            ({"thumb": sensor("uskin-4x4")}, "thumb"),
-        ],
-    )
-    def test_modules_that_are_no_part_of_a_hand(self, sensors, text):
-        with pytest.raises(ValueError, match=text):
-            XelaEncoder(sensors, whole_hand=True)
-
     def test_a_hand_with_another_sensor_is_sent_in_parts(self):
         assert not XelaEncoder(WHOLE | {"thumb": sensor("uskin-4x4")}).is_hand
 
@@ -227,13 +216,3 @@ def test_a_module_with_its_next_sample_does_not_wait():
         (0.1, {"a": (3, 0.1), "b": (2, 0.0)}),
         (0.2, {"a": (4, 0.2), "b": (2, 0.0)}),
     ]
-
-
-def test_a_module_that_arrives_late_is_passed_on_from_then():
-    given = [(MAX_MODULE_WAIT, {"a": 2}), (MAX_MODULE_WAIT + 0.1, {"b": 3})]
-    batcher = SampleBatcher("ab", own_stamps=True)
-    assert batches(batcher, [(0.0, {"a": 1})]) == []
-    assert batches(batcher, given)[-1] == (
-        MAX_MODULE_WAIT + 0.1,
-        {"a": (2, MAX_MODULE_WAIT), "b": (3, MAX_MODULE_WAIT + 0.1)},
-    )

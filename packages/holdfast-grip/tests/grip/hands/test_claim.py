@@ -11,7 +11,6 @@ import pytest
 from holdfast.cli import main
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands import Claim, claim, open_hand
-from holdfast_grip.hands.local import ScalarGripper
 
 CLAIM = """
 import sys
@@ -130,17 +129,3 @@ class TestResource:
         for uri in ("log:hand", "log:./hand", f"log:{tmp_path}/hand", "log:x/../hand", "log:link"):
             assert open_hand(uri).resource == expected
         assert open_hand("log:other").resource != expected
-
-    def test_a_function_by_any_module(self, tmp_path, monkeypatch):
-        monkeypatch.syspath_prepend(tmp_path)
-        (tmp_path / "claim_hand.py").write_text(
-            "def send(scale): pass\nleft, right = ((lambda scale: side) for side in 'lr')\n"
-        )
-        (tmp_path / "claim_names.py").write_text("from claim_hand import *\ngrip = send\n")
-        names = ("claim_hand:send", "claim_names:send", "claim_names:grip")
-        assert {open_hand(f"call:{name}").resource for name in names} == {
-            f"call:{os.path.realpath(tmp_path / 'claim_hand.py')}:send"
-        }
-        both = {open_hand(f"call:claim_hand:{name}").resource for name in ("left", "right")}
-        assert len(both) == 2
-        assert ScalarGripper(print, "call:x").resource == "call:x"

@@ -150,9 +150,3 @@ def test_a_device_that_changes_has_a_fault(unit, later):
     (arrival,) = assembler.assemble([later, uskin(1, 2, forces=16)], 50.0)
     assert set(arrival.samples) == {"finger2"}
     assert arrival.faults == {"finger1": (Fault.TAXEL_COUNT,)}
-
-
-def test_a_device_that_is_new_is_named():
-    (arrival,) = identified(uskin(0)).assemble([uskin(1), uskin(1, 2)], 50.0)
-    assert set(arrival.samples) == {"finger1"}
-    assert "sensor 2" in arrival.notices[0]
