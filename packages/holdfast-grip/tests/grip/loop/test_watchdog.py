@@ -12,7 +12,6 @@ from types import SimpleNamespace
 import msgspec
 import pytest
 
-from grip.build import scales
 from holdfast_grip import FingerCommand, GripCommand, GripReason, LoopState
 from holdfast_grip.errors import HandError
 from holdfast_grip.loop import watchdog
@@ -73,18 +72,6 @@ def loop(tmp_path):
     for process in processes:
         process.kill()
         process.communicate()
-
-
-@pytest.mark.parametrize("on_fault", ["hold", "open"])
-def test_it_takes_over_when_the_loop_is_killed(loop, on_fault, tmp_path):
-    """The closed pipe is enough: the time-out of the heartbeats is an hour here."""
-    os.kill(loop(on_fault, "3600").pid, signal.SIGKILL)
-    first, *found = wait_for(tmp_path / "hand", 1 + N_SAFE_COMMANDS)
-    assert len(found) == N_SAFE_COMMANDS
-    for command in found:
-        assert (command.state, command.reason) == (LoopState.FAULT, GripReason.WATCHDOG)
-        assert command.release is (on_fault == "open")
-        assert scales(command) == scales(first)
 
 
 def test_a_loop_that_was_paused_sends_no_old_command(loop, tmp_path):
