@@ -181,10 +181,6 @@ class TestLabelsFromSamples:
             Label(3, 4.5, ContactState.UNSTABLE, Cause.SLIP),
         )
 
-    def test_as_many_states_as_times(self):
-        with pytest.raises(ValueError, match="1 states"):
-            labels_from_samples(np.arange(2.0), [None], period=1)
-
 
 class TestRecording:
     @pytest.mark.parametrize("modules", [{}, {"finger1": tactile(n=0)}])
@@ -197,10 +193,6 @@ class TestRecording:
             recording().modules["finger1"] = tactile()
         with pytest.raises(TypeError):
             recording().metadata["object"] = "can"
-
-    def test_labels_for_a_missing_module(self):
-        with pytest.raises(RecordingError, match="thumb"):
-            recording().with_labels({"thumb": ()})
 
     def test_with_labels_replaces_all(self):
         label = Label(0, 0.05, ContactState.STABLE)

@@ -31,8 +31,6 @@ from holdfast.detection import (
     parse_features,
 )
 from holdfast.errors import ModelError, OutputError
-from holdfast.synthetic import synthetic_recording
-from holdfast.training import evaluate
 
 TRAINING = Training(
     recordings={"one": "0a1b"},
@@ -350,13 +348,6 @@ class TestTwin:
         )
         assert all(len(digest) == 32 for digest in hand_model.training.recordings.values())
         assert hand_model.training.figures["accuracy"] > 90
-
-    def test_it_detects_a_grasp(self):
-        grasp = synthetic_recording("grasp", 5, ("thumb", "ring"))
-        metrics = evaluate(Model.load("builtin:twin"), [grasp])
-        assert list(metrics.fingers) == ["thumb", "ring"]
-        assert metrics.pooled.accuracy > 75
-        assert metrics.pooled.auc_contact > 0.9
 
 
 def test_the_plan_takes_the_models_rate():

@@ -159,19 +159,6 @@ def test_do_not_depend_on_the_gain_of_the_sensor(factor, seed):
     )
 
 
-def test_do_not_depend_on_the_order_of_the_taxels():
-    given = sensor("uskin-4x4")
-    readings = walk(given, 80)
-    order = np.random.default_rng(0).permutation(16)
-    turned = Sensor(
-        "other", given.positions[order], given.rotations[order], given.normal, 100.0,
-        range=given.range,
-    )  # fmt: skip
-    np.testing.assert_allclose(
-        features_of(readings[:, order], turned), features_of(readings, given), atol=1e-9
-    )
-
-
 def test_do_not_depend_on_the_frame_of_the_sensor():
     given = sensor("papillarray")
     readings = walk(given, 80)

@@ -55,16 +55,6 @@ def test_pictures_are_kept_with_the_times_of_the_session(film, tmp_path):
     assert picture_stamps(out).tolist() == [1.5, 2.5, 3.5, 4.5, 5.5, 6.5]
 
 
-def test_pictures_before_the_first_sample_are_left_out(film, tmp_path):
-    out = tmp_path / "run.mp4"
-    session = Session(iter([np.nan, np.nan, 7.0, 8.0, 9.0, 10.0]).__next__)
-    with CameraRecorder(str(film), out) as camera:
-        camera.start(session)
-        wait_for(lambda: session.markers)
-    assert brightness(out) == [2, 3, 4, 5]
-    assert picture_stamps(out).tolist() == [7.0, 8.0, 9.0, 10.0]
-
-
 def test_a_video_without_pictures_is_removed(film, tmp_path):
     with CameraRecorder(str(film), tmp_path / "run.mp4") as camera:
         camera.start(Session(lambda: np.nan))

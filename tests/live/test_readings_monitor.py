@@ -97,20 +97,6 @@ def test_a_recording_in_parts_gives_the_same():
     assert found == [f"index: {PULLED}"]
 
 
-def test_two_modules_with_the_same_readings_are_a_notice_once():
-    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
-    found = [
-        notice
-        for sample, time in zip(grasp(), TIMES, strict=True)
-        for name in ("index", "thumb")  # samples may come one by one
-        for notice in monitor.update({name: sample}, time)
-    ]
-    monitor = ReadingsMonitor({"index": PATCH, "thumb": PATCH})
-    parts = parts_of(grasp(), "index", "thumb")
-    assert found == [notice for part in parts for notice in monitor.update_recording(part)]
-    assert [text.startswith("thumb has the same readings as index") for text in found] == [True]
-
-
 @pytest.mark.parametrize(
     ("name", "expected"), [("builtin:any", 1), ("builtin:noise-floor", 0)], ids=["first", "seconds"]
 )

@@ -47,12 +47,6 @@ class TestFound:
         metrics = slip_metrics(count_slips(decisions([(alarm, 7.0)], [slip()])))
         assert list(metrics.incipient.values()) == shares
 
-    def test_gross_counts_from_its_own_onset(self):
-        metrics = slip_metrics(count_slips(decisions([(5.15, 6.0)], [slip(gross=5.2)])))
-        assert metrics.incipient["0.1"] == 0
-        assert metrics.gross == {"before": 100, "0.03": 100, "0.05": 100, "0.1": 100}
-        assert metrics.n_gross == 1
-
     @pytest.mark.parametrize(("alarm", "before"), [(5.3, 100), (5.4, 0)])
     def test_before_1mm(self, alarm, before):
         made = slip(reached=(5.35, math.nan))

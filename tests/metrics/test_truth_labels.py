@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.metrics.truth_labels import (
     LabelRule,
-    common_onsets,
     labels_by_rule,
     labels_from_truth,
     phases_from_touch,
@@ -305,17 +304,3 @@ def test_an_exact_slip_within_the_margin_is_the_onset():
         Label(1.04, 1.5, "UNSTABLE", "slip", author=author),
     ]
     assert [(x.start, x.end) for x in without_margin(labels)] == [(0.0, 1.04), (1.04, 1.5)]
-
-
-@pytest.mark.parametrize(
-    ("parts", "common"),
-    [
-        ((), "labels"),
-        (("truth",), "truth"),
-        (("truth", "labels"), "mixed"),
-        (("truth", "rule"), "rule"),
-        (("labels", "rule"), "rule"),
-    ],
-)
-def test_where_onsets_of_several_recordings_come_from(parts, common):
-    assert common_onsets(set(parts)) == common

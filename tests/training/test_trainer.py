@@ -247,20 +247,3 @@ def test_refusals(given, split, message):
     setting = replace(SETTING, split=split)
     with pytest.raises(TrainingError, match=message):
         train(given, setting)
-
-
-def test_long_steps_report_progress(grasps):
-    steps = []
-
-    def progress(items, what, total):
-        steps.append((what, total))
-        return iter(items)
-
-    train(grasps, GRID, progress=progress)
-    assert steps == [
-        ("reading", 6),
-        ("features", 6),
-        ("choosing", 12),
-        ("fitting", 6),
-        ("evaluating", 6),
-    ]

@@ -86,21 +86,6 @@ def test_same_as_the_naive_distance(name: str, point: tuple[float, float, float]
 
 @pytest.mark.slow
 @settings(max_examples=300)
-@given(name=names, point=points, other=points)
-def test_it_is_a_distance(name: str, point: tuple[float, ...], other: tuple[float, ...]) -> None:
-    """It changes by no more than one moves, and going back along the gradient ends on it."""
-    packed = solid(OBJECTS[name])
-    d, *gradient = probe(packed, *point)
-    assert abs(probe(packed, *other)[0] - d) <= np.linalg.norm(np.subtract(point, other)) + 1e-12
-    if d > 0:
-        assert np.linalg.norm(gradient) == pytest.approx(1, abs=1e-12)
-        assert probe(packed, *(np.array(point) - d * np.array(gradient)))[0] == pytest.approx(
-            0, abs=1e-12
-        )
-
-
-@pytest.mark.slow
-@settings(max_examples=300)
 @given(
     name=names, angle=st.floats(-3.1, 3.1), height=st.floats(-0.9, 0.9), d=st.floats(-2.5e-3, 9e-3)
 )

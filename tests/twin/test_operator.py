@@ -61,14 +61,6 @@ class TestTremor:
         band = (rates > TREMOR_BAND[0] - 0.1) & (rates < TREMOR_BAND[1] + 0.1)
         assert power[band].sum() / power.sum() > 0.999
 
-    def test_its_speed_is_the_slope_of_its_position(self):
-        step = 1e-6
-        for time in (0.0, 0.3, 7.7):
-            before, after = tremor_at(STILL, time - step, 1)[0], tremor_at(STILL, time + step, 1)[0]
-            assert tremor_at(STILL, time, 1)[1] == pytest.approx(
-                (after - before) / (2 * step), 1e-5
-            )
-
 
 class TestHold:
     def test_carries_the_weight(self):

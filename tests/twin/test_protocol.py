@@ -16,7 +16,6 @@ from holdfast.twin.protocol import (
     HAND_OVER_TIME,
     LOST_DISTANCE,
     OPEN_GAP,
-    OPENING_SPEED,
     SETTLE_TIME,
     Plan,
     Protocol,
@@ -104,16 +103,6 @@ def test_a_finger_over_its_grip_waits_and_has_stopped_once_that_lasts():
     halted = depths[(times >= 1.0) & (times < BEFORE + CLOSING_TIMEOUT)]
     assert (halted == halted[0]).all()
     assert (halted > CLOSED_GAP).all()
-
-
-def test_fingers_close_and_open_at_their_speeds():
-    table = Table().run()
-    depths = table.column("depths")[:, 0]
-    steps = np.diff(depths) / PERIOD
-    np.testing.assert_allclose(steps[steps < 0], -SPEED, rtol=1e-9)
-    np.testing.assert_allclose(steps[steps > 1e-9][:-1], OPENING_SPEED, rtol=1e-9)
-    assert depths[0] == OPEN_GAP
-    assert depths.min() >= CLOSED_GAP - SPEED * PERIOD
 
 
 def test_the_operator_lets_go_and_takes_back_in_ramps():

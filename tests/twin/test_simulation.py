@@ -178,22 +178,6 @@ class TestSeeds:
         assert made(Grasp("can", 1, 1)).digest == held.digest
 
 
-class TestLongHold:
-    def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):
-        chosen = msgspec.structs.replace(profile("long-hold"), idle=(0.7, 0.8), hold=6.0)
-        calm, shaken = (
-            made(Grasp("can", 1, 1), msgspec.structs.replace(chosen, arm_tremor=rms))
-            for rms in (0.0, 0.1)
-        )
-        still = quiet(shaken)
-        assert not shaken.truth.hand["outside_force"][still].any()
-        spreads = [on_object(recording, still)[:, 2].std() for recording in (calm, shaken)]
-        assert spreads[0] < 0.005
-        assert spreads[1] == pytest.approx(0.1 * shaken.metadata["object_mass"], rel=0.35)
-        for module in shaken.modules.values():
-            assert (module.label_states[still] == ContactState.STABLE.code).all()
-
-
 class TestMovedByAHand:
     def test_the_object_goes_both_ways(self, moved):
         """The first disturbance is the one called down: it goes down, then up."""

@@ -73,16 +73,6 @@ def test_readings_show_the_contact_force():
     assert np.corrcoef(force[held | (wanted < 0.01)], wanted[held | (wanted < 0.01)])[0, 1] > 0.9
 
 
-def test_several_grasps_of_one_hand_have_its_sensor_and_other_objects():
-    grasps = [simulate_random(RandomHold(1, seed=3, grasp=grasp)) for grasp in (1, 2)]
-    assert [grasp.name for grasp in grasps] == ["hand0001-grasp01", "hand0001-grasp02"]
-    assert [grasp.metadata["grasp"] for grasp in grasps] == [1, 2]
-    first, second = (grasp.modules["thumb"].sensor for grasp in grasps)
-    assert first == second
-    assert grasps[0].metadata["grip"] == grasps[1].metadata["grip"]
-    assert grasps[0].metadata["object_mass"] != grasps[1].metadata["object_mass"]
-
-
 def test_a_measured_hand_differs_from_the_plain_one_in_its_readout_alone(hands):
     """The same physics and times; other readings, and the mechanisms in the metadata."""
     plain = hands[1]

@@ -24,16 +24,6 @@ def folder(tmp_path_factory):
     return save_synthetic(tmp_path_factory.mktemp("corpus") / "main", range(3))
 
 
-def test_a_corpus_loads_only_its_recordings(folder, tmp_path):
-    corpus = scan_corpus("main", folder)
-    save_synthetic(folder, [7])
-    try:
-        assert corpus.load().names == corpus.recordings
-        assert corpus.load()[0].name == "grasp-0"
-    finally:
-        (folder / "grasp-7.parquet").unlink()
-
-
 def test_the_digest_depends_on_everything_that_a_study_uses():
     one = synthetic_recording("one", 0, ["index"])
     index = one.modules["index"]

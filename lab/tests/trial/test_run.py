@@ -78,12 +78,6 @@ def test_samples_arrive_late_by_the_latency(monkeypatch):
         assert (sample == same).all()
 
 
-def test_the_hard_plant_is_deterministic_and_another_hand():
-    hard = replace(CAN, grasp=replace(CAN.grasp, plant="hard"), latency=3)
-    first = run_trial(hard, "fixed")
-    assert run_trial(hard, "fixed") == first != run_trial(CAN, "fixed")
-
-
 def test_a_law_that_knows_the_load_presses_by_its_multiple(monkeypatch):
     monkeypatch.setitem(REFERENCE_ROWS, "weaker", lambda: KnownLoad(1.5))
     weak, strong = (run_trial(CAN, row) for row in ("weaker", "true-load-2"))

@@ -4,7 +4,6 @@ from dataclasses import replace
 import pytest
 
 from holdfast.io import labels_path, load_labels, load_recording, save_recording
-from holdfast.recordings import Recording, Tactile
 
 from .helpers import refusal, run, run_json, save_manual_labels
 
@@ -27,23 +26,6 @@ def test_a_rule_labels_a_folder(capsys, folder):
         doubts = [one["confidence"] for one in each["doubtful"]]
         assert doubts == sorted(doubts)
         assert all(value < 0.8 for value in doubts)
-
-
-def test_the_table_and_what_hides_labels(capsys, folder):
-    """Times are relative where the clock of the recording counts from 1970."""
-    code, out, err = run(capsys, "auto", "signal", folder, "--dry-run")
-    assert code == 0
-    assert [line.split()[0] for line in out.splitlines()[1:3]] == ["one", "two"]
-    assert "2 of 2 recordings" in err and err.count("\n") == 1
-    recording = load_recording(folder / "one.parquet")
-    modules = {
-        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
-        for name, m in recording.modules.items()
-    }
-    save_recording(Recording("late", modules), folder / "late.mcap")
-    lines = run(capsys, "auto", "signal", folder / "late.mcap", "--dry-run")[1].splitlines()
-    assert all(len(line) <= 80 for line in lines)
-    assert all(0 <= float(row.split()[1]) < 30 for row in lines[-5:])  # the least certain
 
 
 def test_recordings_that_begin_in_contact_have_their_first_sample_as_tare(capsys, folder):

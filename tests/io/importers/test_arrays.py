@@ -11,8 +11,6 @@ from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers.arrays import arrays_of_hdf5
 from holdfast.io.importers.columns import Columns
-from holdfast.io.importers.reading import ForeignFile, recordings_of
-from holdfast.io.importers.stored import StoredArray, in_memory
 from holdfast.io.proposals import ProposalError
 from holdfast.sensors import sensor
 
@@ -386,19 +384,3 @@ def test_only_the_last_line_of_json_may_be_cut(tmp_path):
     file.write_text(text.replace('"data"', '"data', 1))
     with pytest.raises(RecordingError, match="record 1"):
         imported(file, {"data": SKIN})
-
-
-def test_an_array_of_several_recordings_is_read_once(tmp_path):
-    reads = []
-
-    def values():
-        reads.append(1)
-        return np.random.default_rng(0).normal(size=(3, 80, 5, 3))
-
-    stored = StoredArray((3, 80, 5, 3), "f", values)
-    source = ForeignFile(
-        tmp_path / "set.h5", {"tactile": stored, "t": in_memory(np.arange(80) / 100)}
-    )
-    made = recordings_of(source, {"tactile": SKIN}, None, lambda _: None)
-    assert [recording.name for recording in made] == ["set-1", "set-2", "set-3"]
-    assert len(reads) == 1

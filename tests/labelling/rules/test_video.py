@@ -8,7 +8,7 @@ import pytest
 from holdfast.errors import RecordingError
 from holdfast.io import stickers
 from holdfast.labelling.rules import propose, video, video_clock
-from holdfast.labelling.rules.video import change_point, with_slips
+from holdfast.labelling.rules.video import change_point
 from holdfast.labelling.rules.video_motion import VideoRule
 from holdfast.metrics.slip_truth import label_slips
 from holdfast.recordings import Label, Recording, Tactile
@@ -310,24 +310,6 @@ def test_a_flash_that_is_not_seen_counts_for_nothing(levels):
     assert video_clock.flash_offset(marked, np.arange(len(levels)) / 60, levels) is None
 
 
-@pytest.mark.parametrize(
-    ("ways", "level", "name"),
-    [
-        ((0, 4), 1.02, video.ONE_STICKER),
-        ((30, 34), 1.02, "the whole picture moves"),
-        ((0, 4), 1.2, "the light changes"),
-    ],
-)
-def test_what_moves_without_a_force_is_named(ways, level, name):
-    after = np.arange(20) > 10
-    places = np.array([np.column_stack([way * after, np.zeros(20)]) for way in ways])
-    film = video.Film(np.where(after, 100.0 * level, 100.0), places)
-    slip = video.SeenSlip(3.0, 0.01, 3.5, 0.001, 0.0001, 4.0, film.what_moves(slice(9, 13)))
-    _, made, _ = with_slips((Label(2, 5, "STABLE"),), [slip])
-    assert (made.state, name in made.evidence) == ("UNSTABLE", True)
-    assert made.cause == ("slip" if name == video.ONE_STICKER else None)
-
-
 class TestSureHold:
     """What may slide is unstable without a cause, or has no label."""
 
@@ -361,11 +343,6 @@ class TestSureHold:
     )  # fmt: skip
     def test_labels_are_cut(self, doubtful, parts):
         assert self.spans(*doubtful) == parts
-
-    def test_before_and_after_the_pictures_it_may_slide(self):
-        assert self.spans(times=self.TIMES[30:61]) == [
-            (2.0, 3.0, None), (3.0, 6.0, "disturbance"), (6.0, 8.0, None)
-        ]  # fmt: skip
 
     @pytest.mark.parametrize(
         ("within", "after", "way"),

@@ -291,16 +291,6 @@ def test_readings_that_are_not_counts_end_the_server():
     assert str(server.failure).startswith("thumb: ")
 
 
-def test_the_end_waits_for_slow_clients(monkeypatch):
-    behind = [1]
-    monkeypatch.setattr(module, "_unsent_bytes", lambda client: behind[0])
-    with played(Made(n=5), wait=True) as server, open_source(server.uri):
-        wait_for(lambda: server.n_packets == 5)
-        assert not server.wait(0.2)
-        behind[0] = 0
-        assert server.wait(PATIENCE)
-
-
 @pytest.mark.parametrize("limit", [0.1, 1e6])
 def test_the_end_waits_for_a_limited_time_and_closing_for_nobody(monkeypatch, limit):
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)

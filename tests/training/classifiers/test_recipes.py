@@ -64,17 +64,6 @@ def test_units_do_not_matter(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("weight", WEIGHTS)
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_the_mean_probability_is_the_base_rate(name, weight, share):
-    given = samples(6000, share)
-    fitted = recipe(name).fit(given, parameters(name, weight), 0)
-    assert fitted.probability(given.features).mean() == pytest.approx(
-        given.positive.mean(), abs=0.03
-    )
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("weight", WEIGHTS)
 @pytest.mark.parametrize("share", [0.15, 0.85])
 def test_probabilities_are_calibrated(name, weight, share):
     train, test = samples(6000, share, seed=0), samples(6000, share, seed=1)

@@ -4,7 +4,6 @@ import pytest
 
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
-from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
 from holdfast.metrics.slip_truth import CREEPING, SLIDING, STILL, Slip, SlipTruth
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
@@ -13,12 +12,10 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
     SlipScores,
     evaluate_slips,
-    log_odds_of,
     slip_curves,
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -73,21 +70,6 @@ def test_scores_are_smoothed_as_by_the_rule_of_a_model():
 
 class _Smoothing:
     smoothing = SLIP_SMOOTHING
-
-
-class TestRanks:
-    ranks = np.sort(np.random.default_rng(1).normal(0, 1, 1000))
-
-    def test_a_higher_score_is_never_lower(self):
-        scores = np.linspace(-5, 5, 500)
-        assert (np.diff(log_odds_of(scores, self.ranks)) >= 0).all()
-
-    def test_the_thresholds_reach_from_every_still_sample_to_none(self):
-        probability = probability_of(log_odds_of(self.ranks, self.ranks))
-        assert (probability >= SLIP_THRESHOLDS[0]).all()
-        assert not (probability >= SLIP_THRESHOLDS[-1]).any()
-        above = probability_of(log_odds_of(self.ranks[-1:] + 0.1, self.ranks))
-        assert above >= SLIP_THRESHOLDS[-1]
 
 
 def test_a_perfect_score_finds_every_slip_without_a_false_alarm():

@@ -86,16 +86,6 @@ def test_the_slip_ratio_by_hand():
     np.testing.assert_allclose(found, [0, 0.01 / 0.048, 0.005 / 0.048])
 
 
-def test_nothing_is_slip_while_the_grip_changes():
-    closing = np.concatenate([np.zeros(50), np.linspace(0, 20, 100)])
-    found = SERVO.features(pressed(along_normal(closing), 150.0, "N"))["index"][:, 0]
-    slow = np.abs(band_pass(closing, 150.0))
-    fast = np.abs(high_pass(closing, 150.0))
-    assert (slow[80:] > 0.18).all()
-    assert (fast[80:] > 0.2).all()
-    assert (found[80:] == 0).all()
-
-
 def test_a_nominal_newton_is_that_of_the_twin():
     assert UskinParameters().counts_per_newton[2] == pytest.approx(1 / NEWTONS_PER_NORMAL_COUNT)
 

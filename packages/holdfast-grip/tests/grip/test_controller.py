@@ -179,15 +179,6 @@ class TestReaction:
         commands, _ = run(raw, time + 0.2, 0.15, index={"probability": 0.0})
         assert scales(commands[-1])["index"] > 1.0
 
-    @pytest.mark.parametrize("law", sorted(LAWS))
-    def test_an_unknown_finger_lowers_nothing(self, law):
-        controller, time = holding(law, cooldown=0.0, min_scale=0.2, fault_after=1.0)
-        _, time = run(controller, time, 0.1, **SLIPPING)
-        before = scales(controller.update(hand(time + 1 / RATE), time + 1 / RATE))
-        unknown = {"state": ContactState.UNKNOWN}
-        commands, _ = run(controller, time + 1 / RATE, 0.5, index=unknown)
-        assert all(scales(commands[-1])[name] >= before[name] for name in FINGERS)
-
 
 class TestFaults:
     @pytest.mark.parametrize("on_fault", ["hold", "open"])

@@ -80,19 +80,6 @@ def test_a_finger_may_be_missing_and_number_types_may_differ(make_recording, ass
         assert_same(got, want)
 
 
-def test_long_recordings_are_several_row_groups(make_recording, assert_same, tmp_path, monkeypatch):
-    from holdfast_interop.lerobot import exporter
-
-    monkeypatch.setattr(exporter, "MAX_GROUP_FRAMES", 50)
-    monkeypatch.setattr(exporter, "MAX_FILE_SIZE", 0)  # every episode has a file of its own
-    recordings = [make_recording(name=name) for name in ("a", "b")]
-    export(recordings, tmp_path / "set")
-    assert pq.ParquetFile(tmp_path / "set" / DATA).num_row_groups == 4
-    assert (tmp_path / "set" / "data/chunk-000/file-001.parquet").is_file()
-    for got, want in zip(import_recordings(tmp_path / "set"), recordings, strict=True):
-        assert_same(got, want)
-
-
 def test_a_changed_reading_is_found(data_set):
     def change(table):
         name = "observation.tactile.thumb"

@@ -167,16 +167,6 @@ def test_diagnostics_are_published_on_changes_and_periodically(monkeypatch):
             time.sleep(0.005)
 
 
-def test_opened_again_and_closed_twice():
-    publisher = FakePublisher()
-    publisher.close()
-    for _ in range(2):
-        with publisher:
-            publisher.publish(estimate(), ())
-    publisher.close()
-    assert publisher.log == ["ended", "ended"]
-
-
 BLIND = {
     reason: finger(ContactState.UNKNOWN, reason=reason, faults=faults)
     for reason, faults in (

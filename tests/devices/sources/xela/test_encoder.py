@@ -61,21 +61,6 @@ def test_what_is_decoded_is_what_was_encoded(version, sensors):
         assert (arrival.faults, arrival.n_lost, arrival.notices) == ({}, 0, ())
 
 
-def test_fields_of_1_7():
-    encoder = XelaEncoder({"thumb": sensor("uskin-4x4")}, version="1.7")
-    packet = parsed(encoder, {"thumb": np.full((16, 3), 0xFA0C)})
-    assert list(packet) == ["message", "time", "sensors", "1"]
-    assert packet["1"] == {
-        "data": ",".join(["FA0C"] * 48),
-        "sensor": "1",
-        "taxels": 16,
-        "model": "uSPa44",
-        "calibrated": None,
-    }
-    assert list(packet["1"]) == ["data", "sensor", "taxels", "model", "calibrated"]
-    assert (packet["message"], packet["time"], packet["sensors"]) == (0, START, 1)
-
-
 @pytest.mark.parametrize(
     ("model", "sensors"),
     [("XR23AHRCPP", WHOLE), ("uSPa35", {"finger1": flat_grid("uSPa35", 15)})],

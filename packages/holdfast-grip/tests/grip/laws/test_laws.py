@@ -218,15 +218,6 @@ class TestStability:
         assert target.scale > 1.2
         assert target.reason is GripReason.LOAD
 
-    def test_a_load_that_someone_else_carries_at_first_is_no_reaction(self):
-        """The calm grip is followed while the object is handed over."""
-        one = touch(tangential=0.05)
-        law = started("holdfast", [one])
-        for k in range(300):
-            one.tangential = min(0.05 + 0.01 * k, 0.6)
-            (target,) = update(law, [one], k * DT, DT)
-            assert target.scale == 1.0
-
     def step(self, probability, scale=1.0, slip=None):
         """Return the rise at the second sample; `slip` is the probability of a slide."""
         one = touch(probability=probability)

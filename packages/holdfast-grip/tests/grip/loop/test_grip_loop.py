@@ -71,15 +71,6 @@ def stepped(loop, time, n=10, **changes):
     return time
 
 
-def test_a_notice_of_the_law_is_one_line(tape):
-    controller, time = holding()
-    texts = []
-    with GripLoop(controller, tape, log=lambda text, _: texts.append(text)) as loop:
-        controller.law.notice = "no response time of the hand"
-        stepped(loop, time)
-    assert texts.count("grip: no response time of the hand") == 1
-
-
 def test_a_dry_run_sends_nothing_and_logs_everything(tape):
     controller, time = holding(rise=30.0)
     texts = []
@@ -204,13 +195,6 @@ class TestTakenOver:
             stepped(loop, time, **dict.fromkeys(FINGERS, SLIPPING))
         assert scales(loop.last)["index"] > 1.0
         assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
-
-    def test_an_orderly_end_after_it_does_not_close_the_hand(self, tape):
-        controller, time = holding(on_fault="open")
-        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=10))
-        with pytest.raises(HandError, match="taken over"), loop:
-            stepped(loop, time, n=10)
-        assert tape.commands[-1].release
 
 
 class TestFollow:
