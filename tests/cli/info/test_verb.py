@@ -142,7 +142,7 @@ class TestModel:
 
 def test_parts_of_any_size_give_the_same(capsys, path, monkeypatch):
     whole = info_json(capsys, path)
-    for n_samples in (1, 100):
+    for n_samples in (50, 400):
         monkeypatch.setattr("holdfast.labelling.review.content.SAMPLES_OF_PART", n_samples)
         assert info_json(capsys, path) == whole
 
