@@ -10,8 +10,10 @@ from holdfast import open_source, save_recording
 from holdfast.errors import SourceError
 from holdfast.live.health import (
     HealthCheck,
+    ModuleHealth,
     changes_since,
     check_health,
+    history_path,
     keep,
     module_health,
     read_history,
@@ -131,3 +133,17 @@ def test_a_hand_that_is_touched_from_the_start_is_told_so(tmp_path):
     for readings, metadata in ((released, {}), (early, {}), (open_hand(), {"starts_loaded": True})):
         with pytest.raises(SourceError, match="is touched from the start: open the hand"):
             checked(tmp_path, {"index": readings}, metadata)
+
+
+def test_checks_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    path = history_path("xela://127.0.0.1:5000")
+    assert path == tmp_path / "holdfast/health/xela_127.0.0.1_5000.json"
+    assert read_history(path) == []
+    first = check("2026-11-12", index=health(open_hand()))
+    keep(path, [first] * 60, first)
+    assert read_history(path) == [first] * 50
+    assert isinstance(read_history(path)[0].modules["index"], ModuleHealth)
+    path.write_text("{")
+    with pytest.raises(SourceError, match=r"xela_127.0.0.1_5000.json is no history of checks: "):
+        read_history(path)

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from holdfast.contact import Cause, ContactState, Phase
 from holdfast.metrics.truth_labels import (
     LabelRule,
+    common_onsets,
     labels_by_rule,
     labels_from_truth,
     phases_from_touch,
@@ -134,6 +135,12 @@ def slipped_after_the_lock(rest):
     """Return a grasp with a slip that long after closing, beyond the margin."""
     start = 2.0 + rest + RULE.margin
     return truth(*GRASP, slip=[(start, start + 0.05, 0.01)])
+
+
+@pytest.mark.parametrize("rest", [0.0, 0.04, 0.15, 0.3])
+def test_a_short_gap_between_closing_and_the_first_slip_is_not_stable(rest):
+    rows = joined(label_rows(slipped_after_the_lock(rest)))
+    assert rows[1:3] == [(1.5, pytest.approx(2.25 + rest, abs=0.02), U), (rows[1][1], 5.0, S)]
 
 
 def test_a_longer_gap_between_closing_and_the_first_slip_is_stable():
@@ -304,3 +311,17 @@ def test_an_exact_slip_within_the_margin_is_the_onset():
         Label(1.04, 1.5, "UNSTABLE", "slip", author=author),
     ]
     assert [(x.start, x.end) for x in without_margin(labels)] == [(0.0, 1.04), (1.04, 1.5)]
+
+
+@pytest.mark.parametrize(
+    ("parts", "common"),
+    [
+        ((), "labels"),
+        (("truth",), "truth"),
+        (("truth", "labels"), "mixed"),
+        (("truth", "rule"), "rule"),
+        (("labels", "rule"), "rule"),
+    ],
+)
+def test_where_onsets_of_several_recordings_come_from(parts, common):
+    assert common_onsets(set(parts)) == common

@@ -136,3 +136,8 @@ class TestAllegro:
         module = hand("allegro-uskin").modules[finger]
         shift = module.positions - module.sensor.positions
         np.testing.assert_allclose(shift, np.tile(shift.mean(axis=0), (30, 1)), atol=1e-4)
+
+    @pytest.mark.parametrize("shape", [(367, 3), (368, 2), (2, 3, 368)])
+    def test_split_of_a_packet_of_another_shape(self, shape):
+        with pytest.raises(ValueError, match="allegro-uskin"):
+            hand("allegro-uskin").split(np.zeros(shape))

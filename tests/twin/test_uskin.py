@@ -13,6 +13,7 @@ from holdfast.twin.surface import curved_fingertip
 from holdfast.twin.uskin import (
     Uskin,
     UskinParameters,
+    kept_in_gaps,
     last_updates,
     taxel_shares,
     with_server_effects,
@@ -304,6 +305,17 @@ def test_rows_show_the_last_update_and_none_of_the_future(rows, phase, n):
     assert (np.arange(n) - shown < rows + 1).all()
     assert (np.diff(shown) >= 0).all()
     assert len(np.unique(shown)) == pytest.approx(n / rows, abs=2)
+
+
+def test_gaps_lose_all_rows_of_their_time():
+    times = np.arange(50_000) / 500
+    kept = kept_in_gaps(times, 0.5, (0.019, 0.025), np.random.default_rng(2))
+    gaps = np.diff(times[kept])
+    gaps = gaps[gaps > 1.5 / 500]
+    assert 30 <= len(gaps) <= 70
+    assert gaps.max() < 0.06
+    assert np.median(gaps) == pytest.approx(0.022 + 1 / 500, abs=0.002)
+    assert kept[[0, -1]].all()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from holdfast.twin.objects import object_named
 from holdfast.twin.operator import Disturbance, draw_tremor
 from holdfast.twin.profile import profile
 from holdfast.twin.protocol import OPEN_GAP, Command, Plan
-from holdfast.twin.world import GRAVITY, World
+from holdfast.twin.world import GRAVITY, MIN_HEIGHT, World
 
 PATH = closing_path(object_named("can"))
 DOWN = Disturbance(0.0, 1.0, "down", 0, np.array([0.0, 0, -1, 0, 0, 0, 0.006, 700, 4]))
@@ -48,6 +48,16 @@ def test_begins_as_the_object_is_put_there():
     assert np.arctan2(made.bodies[-1, 6], made.bodies[-1, 3]) == pytest.approx(turn + 0.1)
     assert not made.loads.any()
     assert made.slip == 0.0
+
+
+def test_a_fallen_object_stays_below_the_picture():
+    made = run(world(), 1.0, hold=0.0)
+    low = made.bodies[-1, 2]
+    assert MIN_HEIGHT - 0.2 < low < MIN_HEIGHT
+    run(made, 1.0, hold=0.0)
+    assert made.bodies[-1, 2] == pytest.approx(low, abs=0.01)
+    assert np.linalg.norm(made.bodies[-1, 12:]) < 0.1
+    assert np.isfinite(made.hand.data.qpos).all()
 
 
 def test_closed_fingers_press_and_hold_it_alone():

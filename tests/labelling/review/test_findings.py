@@ -4,7 +4,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from holdfast.detection import Tare
 from holdfast.io import load_recording, save_labels, save_recording
+from holdfast.labelling.review.content import content_of
 from holdfast.labelling.review.findings import (
     findings_of,
     findings_of_scan,
@@ -14,7 +16,7 @@ from holdfast.labelling.review.findings import (
 )
 from holdfast.labelling.review.scan import FindingsScan
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import Sensor
+from holdfast.sensors import Sensor, flat_sensor
 from holdfast.synthetic import synthetic_recording
 
 
@@ -64,6 +66,22 @@ def test_one_taxel_and_an_odd_rate():
     readings = rng.normal(0, 1, (200, 1, 3))
     kinds = [kind for _, kind, _ in found(Tactile(one, np.arange(200) / 20, readings))]
     assert sorted(kinds) == ["no_contact", "one_taxel", "rate"]
+
+
+def test_more_taxels_than_a_detector_takes(tmp_path):
+    skin = flat_sensor("wide", 19, 27, 0.005, 0.005)
+    readings = np.random.default_rng(0).normal(0, 1, (200, 513, 3))
+    wide = Recording("wide", {"skin": Tactile(skin, np.arange(200) / 100, readings)})
+    save_recording(wide, tmp_path / "wide.parquet")
+    content = content_of(tmp_path / "wide.parquet", Tare.parse("0.5"))
+    assert content["modules"]["skin"]["faults"] == {}
+    assert "many_taxels" in {finding["kind"] for finding in content["findings"]}
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("count", 1e-6), ("N", 1.0)])
+def test_readings_in_another_unit(thumb, unit, factor):
+    module = Tactile(thumb.sensor, thumb.times, thumb.readings * factor, unit)
+    assert "unit" in {kind for _, kind, _ in found(module)}
 
 
 def test_a_start_in_contact(thumb):

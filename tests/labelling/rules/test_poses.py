@@ -93,6 +93,15 @@ def test_truth_with_something_else(hand, text):
         poses_from_truth(recording(Truth(np.arange(5.0), hand)))
 
 
+@pytest.mark.parametrize(
+    ("times", "shape", "text"),
+    [([0.0, 0.0], (2, 3), "times"), ([0.0, 1.0], (2, 2), "shapes")],
+)
+def test_arrays_of_a_track_must_fit(times, shape, text):
+    with pytest.raises(RecordingError, match=text):
+        PoseTrack(np.array(times), np.zeros(shape), np.zeros((2, 4)))
+
+
 def test_frozen_and_sentinel_poses_are_out_of_sight_a_slow_tracker_is_not():
     times = np.arange(60) / 100
     position = np.repeat(np.arange(12), 5)[:, None] * [1.0, 0, 0]  # at 20 Hz, repeated at 100 Hz

@@ -10,7 +10,7 @@ from holdfast.io import import_recordings
 from holdfast.labelling.rules import tracking
 from holdfast.labelling.rules.poses import Poses, PoseTrack, in_sight
 from holdfast.labelling.rules.tracking import TrackingRule
-from holdfast.recordings import Truth, label_states
+from holdfast.recordings import Recording, Truth, label_states
 
 from .build import (
     CLOSING,
@@ -21,6 +21,7 @@ from .build import (
     check,
     clock,
     grasp,
+    module,
     poses,
     slide,
     tracked,
@@ -146,6 +147,15 @@ def test_another_clock_is_found(offset):
     assert (float(found[1]) if found else 0.0) == pytest.approx(offset, abs=0.05)
     given = tracking.propose(grasp(), tracking=other, offset=offset)["thumb"]
     assert [x.start for x in given] == pytest.approx([x.start for x in labels], abs=0.05)
+
+
+def test_unreliable_clocks_halve_the_confidence():
+    times = clock()
+    pose = poses(times, 0 * times, jitter=1e-4)
+    other = Poses("file", PoseTrack(times, pose[:, :3], pose[:, 3:]), same_clock=False)
+    free = {n: module(times, np.zeros((len(times), 3)), k) for k, n in enumerate(["thumb"])}
+    (label,) = tracking.propose(Recording("nothing", free), tracking=other)["thumb"]
+    assert label.confidence <= 0.5
 
 
 def test_a_finger_without_poses_has_no_labels():

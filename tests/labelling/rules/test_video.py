@@ -354,6 +354,10 @@ class TestSureHold:
         rest[150:, 0] += after
         assert max(video.moved_by(rest, slice(100, 150), 18)) == pytest.approx(way, abs=0.01)
 
+    def test_where_nothing_is_seen_before_or_after_it_may_slide(self):
+        assert video.moved_by(np.zeros((50, 2)), slice(0, 20), 18)[0] == np.inf
+        assert video.moved_by(np.zeros((50, 2)), slice(20, 50), 18)[0] == np.inf
+
     def test_what_no_picture_shows_is_doubtful(self, film, monkeypatch):
         times, found = sticker_track()
         film(times, found)

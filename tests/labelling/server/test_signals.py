@@ -109,6 +109,21 @@ def test_modules_without_a_finite_sample():
     assert signals.part(5.0, 6.0).exact
 
 
+@pytest.mark.parametrize(
+    ("start", "end", "points", "text"),
+    [
+        (2.0, 1.0, 100, "an end after the start"),
+        (float("nan"), 1.0, 100, "an end after the start"),
+        (0.0, float("inf"), 100, "an end after the start"),
+        (0.0, 1.0, 1, "points"),
+        (0.0, 1.0, 10**6, "points"),
+    ],
+)
+def test_invalid_parts_are_rejected(start, end, points, text):
+    with pytest.raises(ValueError, match=text):
+        signals_of(RECORDING).part(start, end, points)
+
+
 def test_a_tare_without_samples_is_rejected():
     for tare in ((50.0, 60.0), "soon"):
         with pytest.raises(ValueError, match=r"^tare"):

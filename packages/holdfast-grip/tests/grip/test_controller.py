@@ -129,6 +129,13 @@ class TestStart:
             estimate = hand(k / RATE, state, **fingers)
             assert controller.update(estimate, k / RATE).state is LoopState.IDLE
 
+    def test_a_finger_without_an_estimate_blocks_it(self):
+        controller = GripController(Limits())
+        unknown = {"index": {"state": ContactState.UNKNOWN}}
+        for k in range(170):
+            controller.update(hand(k / RATE, ContactState.UNSTABLE, **unknown), k / RATE)
+        assert controller.state is LoopState.IDLE
+
     def test_a_new_grip_presses_more_within_the_limits_until_the_object_rests(self):
         """Only with a slip rule, by which it may begin before a person lets go."""
         controller, time = holding(changes=NO_SLIP, rise=2.0)
@@ -354,6 +361,11 @@ class TestUnits:
             GripController(Limits(), law, sensors={"index": sensor("uskin-curved")})
         GripController(Limits(), law, sensors={"index": sensor("papillarray")})
         GripController(Limits(), law, newtons_per_unit=7e-4)
+
+    @pytest.mark.parametrize("factor", [0.0, -1.0, math.nan, (1.0, 1.0, 0.0)])
+    def test_a_calibration_is_above_0(self, factor):
+        with pytest.raises(ValueError, match="newtons_per_unit"):
+            GripController(Limits(), newtons_per_unit=factor)
 
     def test_the_law_of_holdfast_needs_no_unit(self):
         """Forces a thousand times as large give the same scales."""

@@ -72,6 +72,12 @@ class TestLaw:
         update(law, [one], DT, DT)
         assert "something slid" in law.notice
 
+    def test_a_response_that_changes_twice_is_told(self):
+        law, _, _ = held(3 * DT)
+        for _ in range(2):
+            law.response.take(0.11)
+        assert "to 110 ms" in law.response.notice
+
     def test_a_model_without_a_slip_rule_gives_no_rise(self):
         law, _, targets = held(5 * DT, one=touch())
         assert {target.scale for target in targets} == {1.0} and law.response.time == 0.0

@@ -196,6 +196,13 @@ class TestTakenOver:
         assert scales(loop.last)["index"] > 1.0
         assert scales(tape.commands[-1]) == dict.fromkeys(FINGERS, 1.0)
 
+    def test_an_orderly_end_after_it_does_not_close_the_hand(self, tape):
+        controller, time = holding(on_fault="open")
+        loop = GripLoop(controller, tape, armed=True, watchdog=LateBeats(before=10))
+        with pytest.raises(HandError, match="taken over"), loop:
+            stepped(loop, time, n=10)
+        assert tape.commands[-1].release
+
 
 class TestFollow:
     def test_it_sends_nothing_and_the_next_step_has_its_force(self, tape, armed):
