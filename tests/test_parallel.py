@@ -307,11 +307,3 @@ class TestNothingGlobalStays:
         assert added in warnings.filters  # the second pool still runs
         assert list(second) == [2]
         assert warnings.filters == before
-
-    def test_filters_that_the_program_reset_meanwhile_stay_so(self):
-        with warnings.catch_warnings():
-            calls = Engine(2).map_ordered(abs, [(-1,), (-2,)])
-            next(calls)
-            warnings.resetwarnings()
-            assert list(calls) == [2]
-            assert warnings.filters == []

@@ -129,6 +129,12 @@ def test_refuses_other_shapes(shape, message):
         fingertip_force(np.zeros(shape), CURVED)
 
 
+@pytest.mark.parametrize("n", [8, 10])
+def test_refuses_other_times(n):
+    with pytest.raises(RecordingError, match="times"):
+        fingertip_force(readings(9), CURVED, times=np.arange(n))
+
+
 def module(values, which=CURVED, times=None):
     times = np.arange(len(values)) / which.rate if times is None else times
     return Tactile(which, times, values)
