@@ -50,7 +50,7 @@ class Listener(threading.Thread):
     def __init__(self, uri, n):
         super().__init__()
         self.uri, self.n = uri, n
-        self.arrivals = []
+        self.arrivals, self.sensors = [], {}
         self.start()
 
     def run(self):
@@ -58,6 +58,7 @@ class Listener(threading.Thread):
         while time.monotonic() < deadline and not self.arrivals:
             try:
                 with open_source(self.uri) as source:
+                    self.sensors = source.sensors
                     while len(self.arrivals) < self.n and time.monotonic() < deadline:
                         arrival = source.read(0.1)
                         if arrival is not None and arrival.samples:

@@ -29,6 +29,16 @@ def test_no_peak_is_lost(n):
     assert (short_times[0], short_times[-1]) == (times[0], times[-1])
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_what_falls_is_drawn_falling_and_what_rises_rising(sign):
+    values = sign * np.interp(np.arange(20_000), [0, 9_000, 12_000, 20_000], [9, 8, 1, 0])
+    values[15_001:] -= sign * 5.0
+    values[::3] = np.nan
+    _, short = envelope(np.arange(20_000.0), values, 1000)
+    assert (sign * np.diff(short)).max() <= 0
+    assert (sign * np.diff(short)).min() <= -5
+
+
 def test_long_stretches_of_nan_stay_nan():
     values = np.ones(100_000)
     values[30_000:40_000] = np.nan
