@@ -292,14 +292,6 @@ class TestSampleAndHold:
         assert updates["index"] is lively
         assert updates["thumb"].rate == pytest.approx(slow_rate, rel=0.12)
 
-    def test_a_module_that_does_not_hold_keeps_all_rows(self, grasp):
-        _, held = slow_and_held(grasp)
-        noise = np.random.default_rng(0).normal(size=held.modules["index"].readings.shape)
-        module = held.modules["index"]
-        lively = Tactile(module.sensor, module.times, module.readings + noise)
-        mixed = Recording("mixed", {**held.modules, "index": lively})
-        assert true_updates(mixed) is mixed
-
 
 def test_a_reading_that_remains_is_a_sample_again():
     repeats = UpdateFilter(rate=10.0)

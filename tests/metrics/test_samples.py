@@ -16,6 +16,18 @@ def columns(samples):
     return labels, states, np.where(states == UNKNOWN, np.nan, scores.astype(float))
 
 
+def test_rates_by_hand():
+    labels = [STABLE] * 5 + [UNSTABLE] * 3 + [NO_CONTACT] * 2
+    states = [STABLE] * 4 + [UNSTABLE] + [STABLE, UNSTABLE, NO_CONTACT] + [NO_CONTACT] * 2
+    scores = [0.9, 0.8, 0.7, 0.6, 0.4, 0.65, 0.3, 0.2, 0.1, 0.1]
+    metrics = sample_metrics(labels, states, scores)
+    assert metrics.confusion == [[4, 1], [1, 4]]
+    assert (metrics.n, metrics.accuracy) == (10, 80.0)
+    assert (metrics.fdr, metrics.fpr, metrics.fnr) == (20.0, 20.0, 20.0)
+    assert metrics.auc == 23 / 25
+    assert metrics.auc_contact == 13 / 15
+
+
 @given(st.lists(sample, min_size=2, max_size=60))
 def test_scikit_learn_agrees(samples):
     labels, states, scores = columns(samples)
