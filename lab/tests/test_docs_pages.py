@@ -55,6 +55,10 @@ def test_every_table_with_figures_is_made_from_a_file():
     assert by_hand == set(BY_OTHER_TESTS) | set(MEASURE_NOTHING)
 
 
+TABLE_OF_SETS = {"columns": ["set", "share"], "rows": [["a", "1"], ["b", "2"]], "command": "run",
+                 "revision": "12345678", "date": "2026-11-27"}  # fmt: skip
+
+
 def test_a_figure_that_no_file_gives_is_found():
     page = "# Page\n\n| set | share |\n|---|--:|\n| a | 1 |\n\nText.\n"
     assert len(unmarked(page)) == 1

@@ -69,15 +69,6 @@ def test_incomplete_decisions_can_be_drawn(decisions):
     draw(decisions).savefig(io.BytesIO(), format="png")
 
 
-def test_recordings_are_sorted_with_the_best_on_top():
-    decisions = [
-        Decisions.of(name, {"thumb": finger(k, delay=delay)}, 1)
-        for k, (name, delay) in enumerate([("late", 0.4), ("prompt", 0.0), ("middling", 0.2)])
-    ]
-    axes = draw(decisions).axes[0]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["late", "middling", "prompt"]
-
-
 def test_calibration_by_hand():
     labels = np.array([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, STABLE])
     states = np.array([STABLE, STABLE, STABLE, NO_CONTACT, STABLE, UNKNOWN])

@@ -12,7 +12,7 @@ from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
-from holdfast.plots.slips import draw_slips_found, slip_series
+from holdfast.plots.slips import draw_slips_found
 from holdfast.recordings import Truth
 from holdfast.synthetic import synthetic_recording
 
@@ -75,19 +75,6 @@ def model():
     rule = replace_fields(part.stable.rule, weights=(tuple(-value for value in weights),))
     slip = replace_fields(part.stable, name="slip", rule=rule, hold=0.1)
     return replace_fields(built_in, fingers={"*": part.with_heads(slip)})
-
-
-def test_decisions_stand_below_the_truth(grasp, model):
-    figure = plot_recording(grasp, model=model)
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels[:4] == ["force [counts]", "σ [counts]", "slip [mm/s]", "p(slip)"]
-    series = slip_series(model, grasp)["thumb"]
-    assert series.raised.any()
-    drawn = max(figure.axes[3].get_lines(), key=lambda line: len(line.get_xdata()))
-    np.testing.assert_array_equal(drawn.get_ydata(), series.probability)
-    n_runs = np.count_nonzero(np.diff(series.raised.astype(int), prepend=0) == 1)
-    assert len(figure.axes[2].patches) == len(figure.axes[3].patches) == n_runs
-    assert "slides (decided)" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_without_a_truth_decisions_are_drawn_alone(grasp, model):

@@ -13,7 +13,7 @@ from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
 from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan
-from study.example_recordings import corpora_of, recording_with_truth, results_of, rows_of
+from study.example_recordings import corpora_of, recording_with_truth, results_of
 
 pytestmark = pytest.mark.slow
 
@@ -72,25 +72,6 @@ def test_the_tables_can_be_laid_out(tables):
     for table in tables.values():
         assert table.rows and table.note
         assert to_markdown(table) and to_json(table)
-
-
-def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables):
-    """Fingers are compared with fingers of the paper's method, hands with its hands."""
-    for name, base in (("zhang", "metrics"), ("jl_global_logreg", "hand")):
-        for key in ("recording", "object", "others"):
-            (row,) = rows_of(
-                tables["methods"],
-                method=METHODS[name].title,
-                on=jobs.SPLIT_TITLES[key],
-                figure=sample_tables.ACCURACY_DIFFERENCE,
-            )
-            own = results[f"methods/{name}"][key].metrics
-            family = [results[f"methods/{each}"][key] for each in ("logreg", "logreg_unweighted")]
-            best = max((getattr(each, base) for each in family), key=accuracy)
-            assert correct_and_all(own).keys() == correct_and_all(best).keys()
-            assert row.ours == pytest.approx(accuracy(own) - accuracy(best))
-            low, high = row.interval
-            assert low <= row.ours <= high
 
 
 def accuracy(metrics):
