@@ -11,7 +11,6 @@ from holdfast.detection import Tare
 from holdfast.detection.features import extract
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
-    SLIDING_CHOICE,
     SLIDING_FEATURES,
     SLIDING_LAGS,
     ZERO_KINDS,
@@ -281,10 +280,3 @@ def test_signs_tell_a_press_from_a_pull_and_a_release(push, signs):
     specs = tuple(FeatureSpec(kind, transform="relative", seconds=0.1) for kind in signs)
     found = features_of(readings, np.arange(120) / RATE, sensor, specs=specs)[100]
     assert np.sign(np.round(found, 2)).tolist() == list(signs.values())
-
-
-def test_the_lists():
-    assert (len(SLIDING_FEATURES), len(set(SLIDING_FEATURES))) == (97, 97)
-    assert len(SLIDING_CHOICE) == 32
-    assert set(SLIDING_CHOICE) < set(SLIDING_FEATURES)
-    assert sum(spec.kind not in ZERO_KINDS for spec in SLIDING_FEATURES) == 92
