@@ -29,8 +29,8 @@ for _signal, _handler in (
 # The checks of a submission try the same examples every time; at home they differ. No example has
 # a deadline: pytest limits the time of a test. A test names another number of examples by
 # `settings(max_examples=...)`; without it, the quick part tries five.
-hypothesis.settings.register_profile("home", deadline=None, max_examples=50)
-hypothesis.settings.register_profile("checks", deadline=None, max_examples=50, derandomize=True)
+hypothesis.settings.register_profile("home", deadline=None, max_examples=30)
+hypothesis.settings.register_profile("checks", deadline=None, max_examples=30, derandomize=True)
 hypothesis.settings.register_profile("quick", deadline=None, max_examples=5)
 hypothesis.settings.load_profile("checks" if os.environ.get("CI") else "home")
 

@@ -171,13 +171,6 @@ class TestWithFaults:
         shaken = hand({"thumb": ContactState.UNSTABLE, "index": ContactState.STABLE})
         assert with_faults(shaken, {"index": (Fault.LATE,)}, 2).state is ContactState.UNSTABLE
 
-    def test_another_reason(self):
-        found = with_faults(HELD, {"thumb": (Fault.PACKET_GAP,)}, 2, Reason.GAP)
-        assert found.fingers["thumb"].reason is Reason.GAP
-
-    def test_a_finger_without_a_named_fault_becomes_unknown_too(self):
-        assert with_faults(HELD, {"thumb": ()}, 2).fingers["thumb"].state is ContactState.UNKNOWN
-
     @pytest.mark.parametrize("named", [{}, {"ring": (Fault.LATE,)}])
     def test_unknown_fingers_change_nothing(self, named):
         assert with_faults(HELD, named, 2) is HELD

@@ -33,14 +33,6 @@ def test_the_file_has_the_mode_of_any_new_file(tmp_path):
     assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
 
 
-def test_existing_output_is_kept(tmp_path):
-    target = tmp_path / "a.json"
-    target.write_text("old")
-    with pytest.raises(OutputError, match="--force"):
-        write_whole(target, b"new")
-    assert target.read_text() == "old"
-
-
 def test_a_device_or_a_pipe_is_not_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OutputError, match="pipe; a file"):
@@ -86,14 +78,6 @@ def test_no_temporary_file_can_be_made(tmp_path, monkeypatch):
     monkeypatch.setattr(Path, "touch", read_only)
     with pytest.raises(OutputError, match="Read-only"):
         write_whole(tmp_path / "a", b"")
-
-
-@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
-def test_a_failure_leaves_no_file(tmp_path, failure):
-    with pytest.raises(failure), whole_file(tmp_path / "a.json") as part:
-        part.write_text("half")
-        raise failure
-    assert not list(tmp_path.iterdir())
 
 
 def test_an_input_that_fails_meanwhile_is_not_blamed_on_the_output(tmp_path):

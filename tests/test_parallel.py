@@ -136,9 +136,6 @@ class TestMapOrdered:
         assert next(results) == (0, os.getpid())
         assert taken == [0]
 
-    def test_two_at_a_time_run_in_other_processes(self):
-        assert os.getpid() not in {pid for _, pid in Engine(2).map_ordered(power, [(1, 1)] * 4)}
-
     @pytest.mark.parametrize("n_jobs", [1, 2])
     def test_an_exception_of_the_function_is_raised(self, n_jobs):
         with pytest.raises(ValueError, match="negative"):

@@ -260,9 +260,3 @@ def test_add_a_file_format(copy_of, tmp_path):
     module = load_recording(out / "tap.mcap").modules["index"]
     assert module.times.tolist() == [row["t"] for row in rows]
     assert module.readings.tolist() == [row["taxels"] for row in rows]
-
-
-def test_a_file_that_the_recipe_does_not_name_is_noticed(copy_of):
-    copy = copy_of("Add a grip law")
-    with pytest.raises(AssertionError, match=r"does not name holdfast_grip/controller"):
-        copy.change("holdfast_grip/controller.py")

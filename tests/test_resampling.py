@@ -5,9 +5,7 @@ from hypothesis import strategies as st
 
 from holdfast.contact import ContactState
 from holdfast.detection import Model, detect
-from holdfast.devices.sources.base import Arrival
 from holdfast.errors import ModelError, StreamError
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.resampling import (
     Resampler,
@@ -17,9 +15,8 @@ from holdfast.resampling import (
     rows_per_update,
     true_updates,
 )
-from holdfast.sensors import Sensor, sensor
+from holdfast.sensors import Sensor
 from holdfast.twin.simulation import Grasp, simulate
-from live import build
 
 SENSOR = Sensor("one", [[0.0, 0.0, 0.0]], [np.eye(3)], [0.0, 0.0, 1.0], 100.0)
 
@@ -262,24 +259,6 @@ class TestSampleAndHold:
                 trace.stable_probability, estimated[finger].stable_probability, equal_nan=True
             )
 
-    def test_live_as_well(self, grasp):
-        slow, held = slow_and_held(grasp)
-        expected = detect(Model.load("builtin:any"), slow)
-        sensors = {name: m.sensor for name, m in held.modules.items()}
-        live = StreamDetector(Model.load("builtin:any"), build.Script(sensors))
-        states, notices = {}, []
-        times = next(iter(held.modules.values())).times
-        for k, time in enumerate(times.tolist()):
-            samples = {name: module.readings[k] for name, module in held.modules.items()}
-            update = live.update(Arrival(time, samples, time))
-            notices += update.arrival.notices
-            for result in update.estimates:
-                states[result.estimate.time] = result.estimate.state.code
-        assert live.rate == pytest.approx(50.0)
-        assert any("true updates are used, 50 Hz" in notice for notice in notices)
-        assert list(states) == expected.times.tolist()
-        assert np.mean(np.array(list(states.values())) == expected.hand) > 0.98
-
     @pytest.mark.parametrize(
         ("rate", "expected"), [(None, 50.0), (59.0, 50.0), (41.7, 50.0), (100.0, 100.0)]
     )
@@ -312,35 +291,6 @@ class TestSampleAndHold:
         updates = true_updates(mixed).modules
         assert updates["index"] is lively
         assert updates["thumb"].rate == pytest.approx(slow_rate, rel=0.12)
-
-    def test_zeros_between_true_readings_are_no_updates(self, grasp):
-        slow, held = slow_and_held(grasp, rows=3)
-        zeros = {}
-        for name, module in held.modules.items():
-            readings = np.array(module.readings)
-            readings[np.arange(len(readings)) % 3 != 0] = 0
-            zeros[name] = Tactile(module.sensor, module.times, readings)
-        updates = true_updates(Recording("zeros", zeros)).modules
-        for name, module in slow.modules.items():
-            assert np.array_equal(updates[name].times, module.times)
-            assert np.array_equal(updates[name].readings, module.readings)
-
-    @pytest.mark.parametrize("share", [0.05, 0.2])
-    def test_a_coarse_sensor_at_rest_is_not_slow(self, share):
-        """Less noise than a step: single taxels change, at random."""
-        changed = np.random.default_rng(0).random((2000, 16, 3)) < share / 48
-        readings = 500.0 + changed.cumsum(axis=0)
-        skin = sensor("uskin-4x4")
-        recording = Recording("rest", {"thumb": Tactile(skin, np.arange(2000) / 100, readings)})
-        assert true_updates(recording) is recording
-
-    def test_a_module_that_does_not_hold_keeps_all_rows(self, grasp):
-        _, held = slow_and_held(grasp)
-        noise = np.random.default_rng(0).normal(size=held.modules["index"].readings.shape)
-        module = held.modules["index"]
-        lively = Tactile(module.sensor, module.times, module.readings + noise)
-        mixed = Recording("mixed", {**held.modules, "index": lively})
-        assert true_updates(mixed) is mixed
 
 
 def test_a_reading_that_remains_is_a_sample_again():

@@ -55,6 +55,10 @@ def test_every_table_with_figures_is_made_from_a_file():
     assert by_hand == set(BY_OTHER_TESTS) | set(MEASURE_NOTHING)
 
 
+TABLE_OF_SETS = {"columns": ["set", "share"], "rows": [["a", "1"], ["b", "2"]], "command": "run",
+                 "revision": "12345678", "date": "2026-11-27"}  # fmt: skip
+
+
 def test_a_figure_that_no_file_gives_is_found():
     page = "# Page\n\n| set | share |\n|---|--:|\n| a | 1 |\n\nText.\n"
     assert len(unmarked(page)) == 1
@@ -74,14 +78,3 @@ def test_every_table_has_one_place_and_its_source():
         assert {len(cells) for cells in table["rows"]} == {len(table["columns"])}
         assert re.fullmatch(r"2026-\d\d-\d\d", table["date"])
         assert re.fullmatch(r"[0-9a-f]{8}|the revision of each row", table["revision"])
-
-
-TABLE_OF_SETS = {"columns": ["set", "share"], "rows": [["a", "1"], ["b", "2"]], "command": "run",
-                 "revision": "12345678", "date": "2026-11-27"}  # fmt: skip
-
-
-def test_a_table_has_its_command_revision_and_date():
-    rows = "| set | share |\n| --- | --- |\n| a | 1 |\n| b | 2 |\n\n"
-    assert script.table_text(TABLE_OF_SETS) == f"{rows}`run` (12345678, 2026-11-27)."
-    text = script.table_text(TABLE_OF_SETS | {"at": "abc"})
-    assert text.startswith(f"{rows}`run` at commit abc (1")

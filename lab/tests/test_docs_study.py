@@ -1,7 +1,6 @@
 """The figures in docs/study.md and the pages beside it are those of the published study."""
 
 import json
-import math
 from pathlib import Path
 
 import pytest
@@ -92,92 +91,3 @@ def test_the_page_of_slips_begins_with_its_figures():
     assert f"(in long holds {long_hold})" in page
     found = rows_of("slips", "any")[0]["before 1 mm"].split()[0]
     assert f"[{found} % before 1 mm]" in page
-
-
-ROWS = [
-    {"method": "a", "figure": "x", "ours": 91.25, "paper": 95.0, "difference": -3.75,
-     "interval": [90.0, math.inf]},
-    {"method": "b", "figure": "x", "ours": math.inf, "paper": None, "difference": None,
-     "interval": [math.inf, math.inf]},
-    {"method": "b", "figure": "y_z", "ours": 98.25, "paper": None, "difference": None,
-     "interval": [-1.0, 2.0]},
-]  # fmt: skip
-
-
-class TestFigures:
-    figures = script.Figures({"t": ROWS})
-
-    def test_a_cell(self):
-        a = {"method": "a"}
-        assert self.figures.cell("t", a) == "91.2"
-        assert self.figures.cell("t", a, 2, interval=True) == "91.25 (90.00 to infinite)"
-        assert self.figures.cell("t", a, 0, field="paper") == "95"
-        assert self.figures.cell("t", {"method": "b", "figure": "x"}) == "infinite"
-        assert self.figures.cell("no such table", a) == "–"
-
-    def test_a_cell_must_be_one_row(self):
-        with pytest.raises(LookupError, match=r"t: one row expected for .*, 2 found"):
-            self.figures.cell("t", {"method": "b"})
-        with pytest.raises(LookupError, match="0 found"):
-            self.figures.cell("t", {"method": "c"})
-        assert self.figures.any_cell("t", {"method": "c"}) == "–"
-
-    def test_a_key_that_rows_do_not_have_excludes_nothing(self):
-        assert self.figures.cell("t", {"method": "a", "on": "unseen"}) == "91.2"
-
-    def test_a_grid(self):
-        assert self.figures.grid("t", {}, ["method"], digits_of={"x": 2}) == (
-            "| method | x | y\\_z |\n"
-            "| --- | --: | --: |\n"
-            "| a | 91.25 (90.00 to infinite); paper 95.00 | – |\n"
-            "| b | infinite (infinite to infinite) | 98.2 (−1.0 to 2.0) |"
-        )
-        assert "no rows" in self.figures.grid("u", {}, ["method"])
-
-    @pytest.mark.parametrize("false", ["FPR", "FDR"])
-    def test_the_share_of_stable_labels_follows_from_three_figures(self, false):
-        """80 of 200 are stable; 8 of these are missed, and 18 of the others called stable."""
-        given = {"accuracy": 87.0, "FNR": 10.0, "FPR": 15.0, "FDR": 20.0}
-        rows = [{"figure": name, "ours": value} for name, value in given.items()]
-        figures = script.Figures({"t": rows})
-        share = figures.share_stable("t", {}, ("accuracy", "FNR", false))
-        assert share == pytest.approx(40.0)
-
-
-CSV = """method,figure,ours,paper,difference,n,low,high
-a,x,91.25,95.0,-3.75,2,90.0,
-b,x,inf,,,2,,
-b,y_z,98.2500001,,,2,-1.0,2.0
-"""
-
-
-def finished(folder, **tables):
-    """Write the folder of a finished study."""
-    (folder / "tables").mkdir(parents=True)
-    (folder / "study.json").write_text(json.dumps({"tables": dict.fromkeys(tables), "seed": 0}))
-    for name, text in tables.items():
-        (folder / "tables" / f"{name}.csv").write_text(text)
-    return folder
-
-
-def test_publishing_replaces_the_old_tables(tmp_path):
-    folder = tmp_path / "study"
-    folder.mkdir()
-    (folder / "old.csv").write_text("")
-    (folder / "page.md").write_text("")
-    script.publish(finished(tmp_path / "run", t=CSV, empty="method,figure\n"), tmp_path)
-    names = {path.name for path in folder.iterdir()}
-    assert names == {"study.json", "t.csv", "empty.csv", "page.md"}
-    assert script.published(folder) == {"tables": {"t": ROWS, "empty": []}, "seed": 0}
-    with pytest.raises(FileNotFoundError):
-        script.publish(tmp_path / "none", tmp_path)
-
-
-def test_the_tables_of_real_recordings_may_come_from_another_run(tmp_path):
-    (tmp_path / "study").mkdir()
-    twin = finished(tmp_path / "twin", t=CSV, real=CSV)
-    real = finished(tmp_path / "real", t="", real=CSV.replace("b,", "c,"), real_pairs=CSV)
-    script.publish(twin, tmp_path, real)
-    tables = script.published(tmp_path / "study")["tables"]
-    methods = {name: rows[-1]["method"] for name, rows in tables.items()}
-    assert methods == {"t": "b", "real": "c", "real_pairs": "b"}

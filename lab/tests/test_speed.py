@@ -1,5 +1,3 @@
-import json
-
 import numpy as np
 import pytest
 
@@ -36,17 +34,3 @@ def test_tsflex_computes_the_same(force):
         # Its windows end before the instant that they are stamped with: the last one is missing.
         np.testing.assert_allclose(values, expected[: len(values), column], rtol=0, atol=1e-9 * 300)
         assert len(expected) - len(values) <= 1
-
-
-def test_json_has_the_fields_of_the_contract(capsys, monkeypatch):
-    found = speed.benchmark(n_samples=2000, n_updates=1000)
-    monkeypatch.setattr(speed, "benchmark", lambda *numbers: found)
-    monkeypatch.setattr("sys.argv", ["speed.py", "--json"])
-    speed.main()
-    report = json.loads(capsys.readouterr().out)
-    assert set(report) >= {"machine", "batch", "hand_update"}
-    assert {"seconds_per_sample", "ratio_to_copy", "speedup_over_pywt"} <= set(report["batch"])
-    assert {"p50", "p99", "p999", "speedup_over_pywt_sklearn"} <= set(report["hand_update"])
-    update = report["hand_update"]
-    assert (report["batch"]["n_samples"], update["n_updates"]) == (2000, 1000)
-    assert 0 < update["p50"] <= update["p99"] <= update["p999"]

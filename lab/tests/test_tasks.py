@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_info
 
-from holdfast.errors import EngineError, OutputError
+from holdfast.errors import EngineError
 from holdfast.parallel import Engine
 from holdfast_lab import tasks as work
 from holdfast_lab.tasks import Task, TaskRunner
@@ -133,13 +133,6 @@ def test_a_killed_study_continues_with_the_missing_tasks(tmp_path, log):
     assert max(calls(log).values()) <= 2
 
 
-def test_other_arguments_or_another_function_are_another_result(tmp_path):
-    TaskRunner(tmp_path).run([Task("a", figure, (1, 7), Figure)])
-    TaskRunner(tmp_path).run([Task("a", figure, (1, 8), Figure)])
-    TaskRunner(tmp_path).run([Task("a", max, (1, 7), int)])
-    assert len(kept(tmp_path)) == 3
-
-
 def test_results_of_another_version_are_computed_again_and_one_line_says_so(
     tmp_path, log, monkeypatch
 ):
@@ -178,37 +171,9 @@ def test_a_worker_with_another_source_is_rejected(tmp_path, monkeypatch):
         TaskRunner(tmp_path, Engine(2)).run(tasks(2))
 
 
-def test_the_same_call_under_two_names_is_made_once(tmp_path, log):
-    twins = [Task(name, noted, (1, str(log)), int) for name in "ab"]
-    assert TaskRunner(tmp_path).run(twins) == {"a": 1, "b": 1}
-    assert calls(log) == {"1": 1}
-
-
 def test_two_tasks_of_one_name_are_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"^two tasks are called figure/0$"):
         TaskRunner(tmp_path).run(tasks(2) + tasks(1))
-
-
-def test_tasks_of_high_cost_start_first(tmp_path):
-    seen = []
-
-    def follow(items, what, total, cost):
-        seen.append((what, total))
-        for item in items:
-            seen.append((item[0].name, cost(item)))
-            yield item
-
-    costs = {"short": 1.0, "long": 5.0, "middle": 2.0}
-    TaskRunner(tmp_path, progress=follow).run(
-        [Task(name, figure, (0, k), Figure, costs[name]) for k, name in enumerate(costs)]
-    )
-    assert seen == [("working", 8.0), ("long", 5.0), ("middle", 2.0), ("short", 1.0)]
-
-
-def test_a_folder_that_cannot_be_made(tmp_path):
-    (tmp_path / "work").touch()
-    with pytest.raises(OutputError, match=r"^cannot write .*work: File exists$"):
-        TaskRunner(tmp_path).run(tasks(1))
 
 
 def test_a_damaged_result_is_computed_again(tmp_path):
@@ -222,12 +187,6 @@ def test_a_damaged_result_is_computed_again(tmp_path):
     before, after = map(msgspec.msgpack.decode, (whole, path.read_bytes()))
     assert before | after == before | {"seconds": after["seconds"]}
     assert TaskRunner(tmp_path).seconds(tasks(1)) == after["seconds"] > 0
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_a_failure_names_its_task(tmp_path, engine):
-    with pytest.raises(ValueError, match="fail/2"):
-        TaskRunner(tmp_path, engine).run([Task("fail/2", fail, (2,), int)])
 
 
 @pytest.mark.parametrize(

@@ -146,18 +146,3 @@ def test_settings_that_still_lie_here_are_named_once(verb, words, capsys, tmp_pa
     assert (code, out, rest) == without
     assert "holdfast.toml" in notice
     assert notice.endswith(REMOVED["files"]["holdfast.toml"])
-
-
-def test_verbs_that_did_not_read_the_settings_do_not_name_them(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "holdfast.toml").write_text("[")
-    for verb in ("sensors", "datasets"):
-        main([verb, "--json"])
-        assert "holdfast.toml" not in capsys.readouterr().err
-
-
-def test_a_path_may_have_the_name_of_a_removed_source(capsys, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "hand").mkdir()
-    assert main(["detect", "builtin:any", "hand"]) == 2
-    assert "removed" not in one_line(capsys)

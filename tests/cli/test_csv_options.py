@@ -83,15 +83,6 @@ def test_evaluate_takes_the_labels_of_a_column(folder, sensor, capsys):
     assert json.loads(one)["pooled"]["n"] == report["pooled"]["n"] / 2
 
 
-def test_two_recordings_are_refused(folder, sensor, capsys):
-    (folder / "in").mkdir()
-    for name in ("a", "b"):
-        write_press(folder / "in" / f"{name}.csv")
-    words = ("in", "--sensor", sensor, "--columns", "time=timestamp:ms")
-    _, err = run(capsys, "detect", "builtin:any", *words, code=2)
-    assert err.splitlines()[-1] == "holdfast: one recording expected, 2 given: in"
-
-
 def pasted(err):
     """Return the words of the command of a proposal."""
     command = COMMAND.search(err)[1].replace("\\\n", "")

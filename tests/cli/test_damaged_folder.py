@@ -6,9 +6,7 @@ import shutil
 import pytest
 
 from holdfast.cli import main
-from holdfast.io import load_dataset, save_recording
-from holdfast.labelling.server.documents import list_recordings
-from holdfast.labelling.server.workspace import Workspace
+from holdfast.io import save_recording
 from holdfast.synthetic import synthetic_recording
 
 
@@ -54,14 +52,3 @@ def test_info_shows_the_good_and_marks_the_bad(folder, capsys):
     assert err.count("holdfast: ") == 5
     assert main(["info", str(folder)]) == 2
     assert capsys.readouterr().out.count(" unreadable\n") == 5
-
-
-def test_the_page_lists_the_good_and_marks_the_bad(folder):
-    workspace = Workspace(load_dataset(folder).paths, author="", clock=lambda: "")
-    found = {each.name: each.error for each in list_recordings(workspace).recordings}
-    assert len(found) == 6 and all(found.values())
-    assert "good.labels.json" in found["good"]
-    (folder / "good.labels.json").unlink()
-    found = {each.name: each.error for each in list_recordings(workspace).recordings}
-    assert not found.pop("good")
-    assert all(found.values())

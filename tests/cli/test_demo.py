@@ -4,8 +4,6 @@ import re
 import signal
 import subprocess
 import sys
-import threading
-import urllib.request
 from pathlib import Path
 
 import msgspec
@@ -90,24 +88,6 @@ def test_a_second_run_has_a_folder_of_its_own(tmp_path, monkeypatch):
         assert verb.new_folder(force=False) == Path(name)
         Path(name).mkdir()
     assert verb.new_folder(force=True) == Path("holdfast-demo")
-
-
-def test_the_replay_page_stops_at_the_end_of_the_recording(capsys, tmp_path, monkeypatch):
-    pages = []
-
-    def look(url):
-        with urllib.request.urlopen(f"{url}api/v1/info") as answer:
-            pages.append(json.load(answer))
-        return False
-
-    monkeypatch.setattr("holdfast.web.server.open_browser", lambda url: _in_a_thread(look, url))
-    assert run(capsys, tmp_path / "demo", "--speed", 8, "--browser")[0] == 0
-    assert [set(page["fingers"]) for page in pages] == [{"thumb", "index", "middle", "ring"}]
-
-
-def _in_a_thread(work, url):
-    threading.Thread(target=work, args=(url,)).start()
-    return False
 
 
 def test_the_objects_are_not_those_of_the_training():

@@ -41,34 +41,6 @@ def test_training_recordings_are_named_even_if_renamed(capsys, grasps, tmp_path)
     assert "was trained on 1 of these 2 recordings" in err
 
 
-def restamped(recording, name):
-    """The recording an hour later, as floats, under another name."""
-    modules = {
-        finger: replace(
-            m,
-            times=m.times + 3600.0,
-            readings=m.readings.astype(float),
-            labels=tuple(replace(x, start=x.start + 3600, end=x.end + 3600) for x in m.labels),
-        )
-        for finger, m in recording.modules.items()
-    }
-    return replace(recording, name=name, modules=modules)
-
-
-def test_a_copy_with_other_times_is_found(capsys, grasps, tmp_path):
-    """A copy of a training recording is one; a copy of a new one counts once for the verdict."""
-    save_recording(restamped(load_dataset(grasps / "seen")[0], "a"), tmp_path / "a.parquet")
-    new = load_dataset(grasps / "new")[0]
-    save_recording(replace(new, name="b"), tmp_path / "b.parquet")
-    save_recording(restamped(new, "c"), tmp_path / "c.parquet")
-    _, out, err = run(capsys, grasps / "model.json", tmp_path, "--json")
-    assert json.loads(out)["trained_on"] == ["a"]
-    assert "c of b" in err.splitlines()[0]
-    _, alone, _ = run(capsys, grasps / "model.json", tmp_path / "b.parquet", "--json")
-    verdict = json.loads(out)["verdict"].removeprefix(json.loads(alone)["verdict"])
-    assert verdict.startswith(" From 1 of 3 recordings")
-
-
 def test_the_tables_have_the_trivial_baseline(capsys, grasps):
     _, out, _ = run(capsys, grasps / "model.json", grasps / "new")
     _, document, _ = run(capsys, grasps / "model.json", grasps / "new", "--json")
@@ -104,12 +76,6 @@ def test_the_verdict_is_from_unseen_recordings_only(capsys, grasps, tmp_path):
     assert len(json.loads(out)["recordings"]) == 2
 
 
-def test_no_verdict_if_the_unseen_recordings_have_no_labels(capsys, grasps, tmp_path):
-    folder = mixed(grasps, tmp_path, labels=False)
-    _, out, _ = run(capsys, grasps / "model.json", folder, "--json")
-    assert json.loads(out)["verdict"] is None
-
-
 def test_a_plot_is_overwritten_only_by_force(capsys, grasps, tmp_path):
     plot = tmp_path / "plot.png"
     words = [grasps / "model.json", grasps / "new", "--plot", plot]
@@ -131,16 +97,6 @@ def twin_grasp(tmp_path_factory):
     path = tmp_path_factory.mktemp("twin") / "box.parquet"
     save_recording(recording, path)
     return path
-
-
-def test_the_model_of_the_twin_fits_a_grasp_of_the_twin(capsys, twin_grasp):
-    code, out, err = run(capsys, "builtin:twin", twin_grasp, "--json")
-    assert (code, err) == (0, "")
-    report = json.loads(out)
-    assert list(report["fingers"]) == ["thumb", "index", "middle", "ring"]
-    assert report["trained_on"] == []
-    assert report["pooled"]["accuracy"] > 80
-    assert report["pooled"]["auc"] > 0.9
 
 
 def test_a_truth_with_impacts_has_a_line_of_its_own(capsys, twin_grasp, tmp_path):

@@ -1,5 +1,4 @@
 import json
-from dataclasses import replace
 
 import pytest
 
@@ -127,33 +126,10 @@ class TestOutputs:
         assert str(bad) in refusal(capsys, tmp_path / "in", tmp_path / "x" / "out")
         assert not (tmp_path / "x").exists()
 
-    def test_a_full_disk_names_the_file(self, capsys, table, tmp_path, monkeypatch):
-        def full(*_, **__):
-            raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr("holdfast.io.parquet.write_checksum", full)
-        out = tmp_path / "out"
-        assert str(out / "press.parquet") in refusal(capsys, table(), out)
-        assert not out.exists()
-
-    def test_a_name_with_a_path(self, capsys, grasp, tmp_path):
-        save_recording(replace(grasp, name="../up"), tmp_path / "a.parquet")
-        imported(capsys, tmp_path / "a.parquet", tmp_path / "out")
-        assert sorted(path.name for path in tmp_path.iterdir()) == ["a.parquet", "out"]
-        (written,) = (tmp_path / "out").iterdir()
-        assert load_recording(written).name == "../up"
-
     def test_two_of_one_name(self, capsys, grasp, tmp_path):
         for stem in "ab":
             save_recording(grasp, tmp_path / f"{stem}.parquet")
         assert "'grasp'" in refusal(capsys, tmp_path, tmp_path / "out")
-
-
-def test_real_uskin(capsys, data_folder, tmp_path):
-    document = imported(
-        capsys, data_folder / "uskin_pick_move", tmp_path, "--format", "uskin-pick-move"
-    )
-    assert (document["n_recordings"], document["n_modules"], document["n_samples"]) == (5, 10, 3272)
 
 
 class TestASensorOfOnesOwn:
@@ -199,18 +175,3 @@ class TestASensorOfOnesOwn:
         assert (module.sensor.n_taxels, module.unit) == (9, "N")
         assert module.readings[1, 0, 2] == pytest.approx(0.003)
         assert "--unit" in refusal(capsys, press / "a.csv", tmp_path / "x", "--sensor", "3x3")
-
-    def test_accept_does_not_take_a_finding(self, capsys, press, tmp_path):
-        text = (press / "a.csv").read_text().replace("\n", ",-9999,-9999,-9999\n")
-        text = text.replace("-9999,-9999,-9999", "Fx9,Fy9,Fz9", 1).replace("Fx", "Gx", 0)
-        lines = text.splitlines()
-        (press / "a.csv").write_text(
-            "\n".join([lines[0], *(line if k % 3 else line.rsplit(",", 3)[0] + ",1,2,3"
-                                   for k, line in enumerate(lines[1:]))]) + "\n"
-        )  # fmt: skip
-        words = ["--sensor", "1x10", "--unit", "count", "--columns", "time=timestamp:ms"]
-        code, _, err = VERB.run(capsys, press / "a.csv", tmp_path / "out", *words, "--accept")
-        assert code == 2
-        assert "missing=-9999" in err
-        words[-1] += ",missing=-9999"
-        imported(capsys, press / "a.csv", tmp_path / "out", *words)

@@ -9,7 +9,6 @@ from holdfast.cli import main
 from holdfast.detection import Model, detect
 from holdfast.io import load_dataset, save_recording
 from holdfast.synthetic import synthetic_recording
-from holdfast.training import Setting, train
 
 pytestmark = pytest.mark.slow
 
@@ -55,10 +54,3 @@ def test_train_and_tune(capsys, folder, tmp_path):
     command = ["tune", model, str(folder), "-o", tuned, "--false-alarms", "60", "--in-contact"]
     assert main(command) == 0
     assert 0 < Model.load(tuned).finger("thumb").stable.threshold < 1
-
-
-def test_training_takes_no_threshold_of_contact_from_a_held_start(folder):
-    setting = Setting(trials=0)
-    held = train(load_dataset(folder, in_contact=True), setting).model
-    assert held.finger("thumb").contact_threshold is None
-    assert train(load_dataset(folder), setting).model.finger("thumb").contact_threshold > 0

@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 from command_line import Verb
-from holdfast.cli.options import awaited
 from holdfast.cli.terminal import progress
-from holdfast.contact import Fault
 from holdfast.devices.sources import open_source
 from holdfast.errors import SourceError
 from holdfast.io import save_recording
@@ -72,35 +70,6 @@ class Listener(threading.Thread):
 play = Verb("play").run
 
 
-@pytest.mark.parametrize(
-    "options", [("--version", "1.7", "--separate"), ("--whole-hand",)], ids=" ".join
-)
-def test_a_client_gets_the_recording(capsys, path, recording, options, monkeypatch):
-    """Sample by sample, over a socket, at eight times real time."""
-    monkeypatch.setattr(
-        "holdfast.devices.sources.timeline.MAX_FAULTY_PACE", 1.0
-    )  # a busy machine is slow
-    port = free_port()
-    names = "?fingers=1:thumb,2:index,3:middle,4:ring" if "--separate" in options else ""
-    n = recording.modules["thumb"].n_samples
-    listener = Listener(f"xela://127.0.0.1:{port}{names}", n)
-    code, out, err = play(capsys, path, "--port", port, "--once", "--speed", FAST, *options)
-    listener.join()
-    assert (code, out) == (0, "")
-    message = err.splitlines()
-    assert message[0].startswith(f"xela://127.0.0.1:{port}{names} sends {path} ")
-    assert message[-1] == f"{n} packets sent"
-
-    arrivals = listener.arrivals
-    assert len(arrivals) == n
-    assert not any(a.n_lost or a.n_refused for a in arrivals)
-    assert not any(Fault.CLOCK_JUMP in f for a in arrivals for f in a.faults.values())
-    for name, module in recording.modules.items():
-        np.testing.assert_array_equal([a.samples[name] for a in arrivals], module.readings)
-    paces = np.diff([a.time for a in arrivals])
-    np.testing.assert_allclose(paces, np.diff(recording.modules["thumb"].times), atol=1e-3)
-
-
 def test_json_has_the_address_and_the_number_of_packets(capsys, path, monkeypatch):
     monkeypatch.setattr(progress, "END_POLL_INTERVAL", 0.02)
     port = free_port()
@@ -136,26 +105,6 @@ def test_it_repeats_until_it_is_interrupted(path, ending):
     assert json.loads(out)["packets"] >= 1500  # more than the recording has
     times = [a.time for a in listener.arrivals]
     assert len(times) == 1500 and (np.diff(times) > 0).all()
-
-
-def test_readings_that_are_not_counts(capsys, tmp_path):
-    one = Tactile(sensor("uskin-4x4"), np.arange(3.0), np.full((3, 16, 3), -2.0))
-    save_recording(Recording("x", {"finger1": one}), tmp_path / "x.parquet")
-    code, out, err = play(capsys, tmp_path / "x.parquet", "--port", 0)
-    assert (code, out) == (2, "")
-    assert err.splitlines()[-1].startswith("holdfast: finger1: readings from 0 to 65535 counts")
-
-
-@pytest.mark.parametrize(
-    ("source", "text"),
-    [
-        ("xela://auto", "waiting for the first packet of xela://auto"),
-        ("twin:?object=can", "simulating the first grasp of twin:?object=can"),
-        ("grasp.parquet", ""),
-    ],
-)
-def test_what_a_command_waits_for(source, text):
-    assert awaited(source) == text
 
 
 def orca_recording(path, n=300):

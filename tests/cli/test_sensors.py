@@ -1,17 +1,13 @@
 import json
-import math
 import re
 
 import pytest
 
 from holdfast.cli import main
-from holdfast.plots.sensors import plot_hand, plot_sensor
 from holdfast.sensors import (
     Sensor,
     built_in_hands,
     built_in_sensors,
-    flat_sensor,
-    hand,
     sensor,
 )
 
@@ -53,13 +49,6 @@ def test_step_and_rest_are_shown_where_they_are_known(capsys):
     assert "step" not in shown(capsys, "papillarray")
 
 
-def test_json_of_a_hand(capsys):
-    printed = json.loads(shown(capsys, "allegro-uskin", "--json"))
-    indices = hand("allegro-uskin").modules["index"].flat_indices.tolist()
-    assert printed["modules"]["index"]["flat_indices"] == indices
-    assert "thumb_link3" in shown(capsys, "allegro-uskin")
-
-
 def test_own_sensors(capsys, tmp_path):
     path = tmp_path / "mine.json"
     path.write_text(json.dumps(sensor("gtac").to_dict() | {"name": "mine"}))
@@ -79,25 +68,6 @@ def test_plots(name, suffix, magic, capsys, tmp_path):
     shown(capsys, name, "--plot", plot)
     assert plot.read_bytes().startswith(magic)
     assert list(tmp_path.iterdir()) == [plot]
-
-
-def test_plots_have_the_numbers_of_taxels():
-    modules = hand("allegro-uskin").modules.values()
-    for figure, sizes in (
-        (plot_sensor(sensor("uskin-curved")), [30]),
-        (plot_hand(hand("allegro-uskin")), [module.sensor.n_taxels for module in modules]),
-    ):
-        texts = [text.get_text() for axes in figure.axes for text in axes.texts]
-        numbers = [int(text) for text in texts if text.isdecimal()]
-        assert numbers == [number for size in sizes for number in range(1, size + 1)]
-
-
-def test_plots_a_sensor_of_one_oblique_taxel(capsys, tmp_path):
-    path, third = tmp_path / "one.json", 1 / math.sqrt(3)
-    flat = flat_sensor("one", 1, 1, 0.005).to_dict()
-    flat |= {"normal": [third, third, third]}
-    path.write_text(json.dumps(flat))
-    shown(capsys, path, "--plot", tmp_path / "one.png")
 
 
 def test_a_template_is_read_back(capsys, tmp_path):

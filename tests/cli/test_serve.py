@@ -94,19 +94,6 @@ def test_a_recording_is_ended_with_the_service(capsys, grasp, when_served, tmp_p
     assert load_recording(found[0]["path"]).complete
 
 
-def test_the_token_is_needed(capsys, grasp, when_served):
-    def work(url):
-        with pytest.raises(urllib.error.HTTPError, match="401"):
-            ask(f"{url.partition('?')[0]}api/v1/info")
-        return ask(f"{url.partition('?')[0]}api/v1/info", Authorization="Bearer s&cret-long")
-
-    found = when_served(work)
-    code, out, _ = run(capsys, MODEL, grasp, "--port", 0, "--json", "--token", "s&cret-long")
-    assert code == 0
-    assert json.loads(out)["url"].endswith("?token=s%26cret-long")
-    assert found[0]["type"] == "hello"
-
-
 def test_the_token_of_a_file_or_of_the_environment(tmp_path, monkeypatch):
     file = tmp_path / "token.txt"
     file.write_text("  from-a-file\nsecond line\n")

@@ -1,5 +1,4 @@
 import json
-import re
 
 import pytest
 
@@ -91,16 +90,6 @@ def test_json_the_table_and_info_of_slips(capsys, sliding, tmp_path):
     text = " ".join(run(capsys, "info", out)[1].split())
     assert "(slips-20, slips-21, slips-22, ...) for slip" in text
     assert "out of fold" in run(capsys, "info", sliding / "model.json")[1]
-
-
-def test_info_of_a_model_that_is_tuned_for_both(capsys, sliding, tmp_path):
-    first, second = tmp_path / "slip.json", tmp_path / "both.json"
-    tune(capsys, sliding, first, "--false-alarms", 5, "--for", "slip")
-    run(capsys, "tune", first, sliding / "data", "-o", second, "--false-alarms", 1000)
-    text = " ".join(run(capsys, "info", second)[1].split())
-    for head, wanted in (("stable", "1000 wanted"), ("slip", "5 wanted")):
-        assert re.search(rf" {head}: [^:]*\(slips-20, [^:]*: [^:]* {wanted}\)", text)
-        assert f" for {head}" in text[text.index("tuned on ") :]
 
 
 def test_evaluate_and_train_print_slips(capsys, sliding, grasps, tmp_path):

@@ -18,12 +18,11 @@ from detection.c_detector import (
     random_samples,
 )
 from detection.detector.build import sensor as tiny
-from detection.models import HAND, MODELS, PATCH, TIP, built_in, made, paper, rich
+from detection.models import HAND, MODELS, PATCH, built_in, made, paper, rich
 from holdfast.contact import ContactState, Fault
 from holdfast.detection import Detector
 from holdfast.errors import ModelError
 from holdfast.exporters import header_of
-from holdfast.io.importers import import_recordings
 from holdfast.synthetic import synthetic_recording
 
 pytestmark = [
@@ -112,14 +111,6 @@ def test_several_source_files_of_a_program_may_include_it(compiler, tmp_path):
     assert subprocess.run([tmp_path / "run"], check=False).returncode == 0
 
 
-@pytest.mark.parametrize(
-    ("name", "compiler", "level"),
-    [("rich", "gcc", "-O2"), ("rich", "clang", "-O2"), ("paper", "gcc", "-O0")],
-)
-def test_single_precision_has_no_hidden_conversion(name, compiler, level, tmp_path):
-    compiled(compiler, tmp_path, header_of(*made(name), single=True), level)
-
-
 @pytest.mark.parametrize("name", MODELS)
 def test_random_samples_give_the_same(name):
     model, sensors, rate = made(name)
@@ -137,23 +128,6 @@ def test_random_samples_give_the_same(name):
     assert len(seen) > 5 and (Fault.OFFSET in seen) == counts
 
 
-@pytest.mark.parametrize(("name", "in_contact"), [("paper", False), ("twin", False), ("any", True)])
-def test_a_grasp_gives_the_same(name, in_contact):
-    model, sensors, rate = made(name)
-    recording = synthetic_recording("made", 3, tuple(sensors))
-    python, c = both(model, sensors, rate, in_contact=in_contact)
-    seen = run_recording(python, c, recording)
-    assert seen > {ContactState.UNKNOWN}
-
-
-def test_readings_without_contact_and_ignored_taxels_give_the_same():
-    recording = synthetic_recording("made", 3, tuple(HAND))
-    zero = {name: m.readings[:20].mean(axis=0) for name, m in recording.modules.items()}
-    options = {"in_contact": True, "baselines": zero, "ignore": {"index": [0, 7]}}
-    python, c = both(built_in("any"), HAND, 150.0, **options)
-    assert run_recording(python, c, recording) > {ContactState.UNKNOWN}
-
-
 def test_a_sensor_of_more_than_64_taxels_gives_the_same():
     skin = tiny(88, "skin", limits=(0.0, 65_535.0))
     python, c = both(built_in("any"), {"skin": skin, "pad": PATCH}, 100.0)
@@ -164,34 +138,6 @@ def test_a_sensor_of_more_than_64_taxels_gives_the_same():
         samples = {"skin": skin_sample, "pad": skin_sample[:16] + 7}
         named.add(compare(python, c, samples, k / 100).fingers["skin"].faulty_taxels)
     assert (87,) in named
-
-
-def run_recording(python, c, recording):
-    """Compare both detectors over a recording. Return the states of the fingers."""
-    times = np.unique(np.concatenate([m.times for m in recording.modules.values()]))
-    rows = {name: dict(zip(m.times, m.readings, strict=True))
-            for name, m in recording.modules.items()}  # fmt: skip
-    seen = set()
-    for time in times.tolist():
-        samples = {name: known[time] for name, known in rows.items() if time in known}
-        hand = compare(python, c, samples, time)
-        seen |= {finger.state for finger in hand.fingers.values()}
-    return seen
-
-
-@pytest.mark.parametrize("format_", ["uskin_pick_move", "gtac"])
-def test_real_recordings_give_the_same(format_, data_folder):
-    folder = data_folder / format_
-    if not folder.is_dir():
-        pytest.skip(f"{folder} is not there")
-    recording = next(iter(import_recordings(folder)))
-    recording = recording.recording if hasattr(recording, "recording") else recording
-    model = built_in("any")
-    sensors = model.fingers_of({name: m.sensor for name, m in recording.modules.items()})
-    python, c = both(model, sensors, recording.rate)
-    modules = {name: m.slice(0, 1000) for name, m in
-               recording.modules.items() if name in sensors}  # fmt: skip
-    run_recording(python, c, type(recording)(recording.name, modules))
 
 
 def test_single_precision_is_within_its_tolerance():
@@ -256,21 +202,6 @@ def test_two_headers_in_one_program_are_an_error(tmp_path):
         words = ["cc", "-std=c99", "-fsyntax-only", tmp_path / "main.c"]
         done = subprocess.run(words, capture_output=True, text=True, check=False)
         assert (expected in done.stderr) and (done.returncode == 0) == (expected == "")
-
-
-def test_an_update_may_receive_constant_and_other_arrays(tmp_path):
-    (tmp_path / "model.h").write_text(header_of(paper(), {"a": TIP}, 150.0).text)
-    (tmp_path / "main.c").write_text(
-        '#include "model.h"\nint main(void) {\n'
-        "static holdfast_detector d; static double open[HOLDFAST_N_TAXELS][3];\n"
-        "static const double fixed[HOLDFAST_N_TAXELS][3] = {{0}};\n"
-        "holdfast_estimate e; holdfast_init(&d);\n"
-        "holdfast_update(&d, 0.0, open, &e); holdfast_update(&d, 1.0, fixed, &e);\n"
-        "return e.finger[HOLDFAST_FINGER_A].state == HOLDFAST_UNKNOWN ? 0 : 1; }\n"
-    )
-    words = ["cc", "-std=c99", "-O2", *WARNINGS, tmp_path / "main.c", "-lm", "-o"]
-    subprocess.run([*words, tmp_path / "main"], check=True)
-    assert subprocess.run([tmp_path / "main"], check=False).returncode == 0
 
 
 def test_the_header_says_what_it_was_made_of():

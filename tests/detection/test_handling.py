@@ -9,7 +9,6 @@ import pytest
 from detection.detector.build import (
     RICH,
     SLIP_OWN,
-    TAXELS,
     cause_head,
     finger_model,
     lively,
@@ -94,14 +93,6 @@ def test_another_sensor_has_default_handling():
     assert model().handling_advice({"thumb": sensor()}) == ""
 
 
-def test_another_finger_has_default_handling():
-    fingers = {"thumb": CALIBRATED, "index": PART}
-    named = replace(model(), fingers=fingers, sensors={})
-    hand = {"thumb": sensor(), "index": sensor()}
-    assert named.handled_sensors == ("thumb (tiny)",)
-    assert named.without_handling(hand) == ["index (tiny)"]
-
-
 def states(estimates):
     return [(e.fingers["thumb"].stable_probability, e.fingers["thumb"].state) for e in estimates]
 
@@ -131,19 +122,6 @@ def test_the_live_threshold_is_that_of_the_sensor():
     usual = PART.stable.threshold
     stream = StreamDetector(model(), build.Script(sensors))
     assert stream.thresholds == {"thumb": 0.31, "index": usual}
-
-
-def test_two_sensors_of_one_hand():
-    other = sensor(name="other")
-    hand = recording(thumb=tactile(200), index=tactile(200, 1, other))
-    n = len(TAXELS)
-    handling = replace(HANDLING, location=(0.2,) * n, scale=(0.5,) * n, thresholds={"stable": 0.31})
-    part = finger_model(TAXELS, normalised=True, handling={"tiny": handling})
-    found = detect(model(part), hand).fingers
-    alone = {"thumb": part.for_sensor("tiny"), "index": replace(part, handling={})}
-    for name, own in alone.items():
-        expected = detect(model(own), recording(**{name: hand.modules[name]})).fingers[name]
-        np.testing.assert_array_equal(found[name].stable_probability, expected.stable_probability)
 
 
 def test_a_model_without_it_says_so():

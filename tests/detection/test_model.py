@@ -1,6 +1,5 @@
 import json
 import os
-import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -26,17 +25,12 @@ from holdfast.detection import (
     ANY_FINGER,
     Debounce,
     FeatureSpec,
-    Linear,
     Model,
     Training,
     detect,
     parse_features,
 )
-from holdfast.detection.specs import SLIP_FEATURES
 from holdfast.errors import ModelError, OutputError
-from holdfast.sensors import sensor as built_in_sensor
-from holdfast.synthetic import synthetic_recording
-from holdfast.training import evaluate
 
 TRAINING = Training(
     recordings={"one": "0a1b"},
@@ -98,24 +92,12 @@ class TestSaveAndLoad:
         hand_model = Model(fingers={ANY_FINGER: part}, rate=1 / 3)
         assert msgspec.json.decode(msgspec.json.encode(hand_model), type=Model) == hand_model
 
-    @pytest.mark.parametrize("hand_model", [Model.load("builtin:any"), model(), WITH_SQUARES])
-    def test_a_copy_has_the_same_bytes(self, hand_model, tmp_path):
-        """As one that another process returns."""
-        copy = pickle.loads(pickle.dumps(hand_model))
-        assert copy.encoded() == hand_model.encoded()
-        assert copy.digest == Model.load(saved(copy, tmp_path / "m.json")).digest
-
     def test_step_and_rest_of_a_sensor_are_kept(self, tmp_path):
         plain = Model(fingers={ANY_FINGER: finger_model()}, sensors={"thumb": sensor()})
         assert b'"step"' not in plain.encoded()
         stepped = {"thumb": replace(sensor(), step=0.5, rests_at_zero=True)}
         loaded = Model.load(saved(msgspec.structs.replace(plain, sensors=stepped), tmp_path / "m"))
         assert loaded.sensors == stepped
-
-    def test_numbers_of_numpy(self, tmp_path):
-        rule = Linear((np.float64(1.5),), (2.0,), ((3.0,),), (np.float64(0.25),))
-        hand_model = Model(fingers={ANY_FINGER: finger_model((FeatureSpec("F_x"),), rule=rule)})
-        assert Model.load(saved(hand_model, tmp_path / "m.json")) == hand_model
 
     def test_nothing_is_overwritten(self, tmp_path):
         path = saved(FULL, tmp_path / "m.json")
@@ -321,14 +303,6 @@ class TestFingers:
             hand_model.fingers_of({"b": sensor(3, "big")})
 
 
-@pytest.mark.parametrize(
-    ("rate", "fits"), [(100, True), (81, True), (119, True), (79, False), (121, False)]
-)
-def test_a_rate_within_a_fifth_fits(rate, fits):
-    assert model().rate_fits(rate) is fits
-    assert Model(fingers={ANY_FINGER: finger_model()}).rate_fits(rate)
-
-
 class TestPredictProba:
     def test_a_number_for_each_sample(self):
         made = recording(thumb=tactile(150, seed=1), index=tactile(90, seed=2, start=0.002))
@@ -374,26 +348,6 @@ class TestTwin:
         )
         assert all(len(digest) == 32 for digest in hand_model.training.recordings.values())
         assert hand_model.training.figures["accuracy"] > 90
-
-    def test_what_it_is(self):
-        hand_model = Model.load("builtin:twin")
-        assert list(hand_model.fingers) == [ANY_FINGER]
-        part = hand_model.fingers[ANY_FINGER]
-        assert part.stable.features == parse_features("holdfast")
-        assert part.slip.features == SLIP_FEATURES
-        assert len(part.slip.rule.squares[0]) == len(part.features) == len(SLIP_FEATURES)
-        assert [head.name for head in part.heads] == ["stable", "slip", "slip_speed", "cause"]
-        assert part.sensor == "uskin-curved"
-        assert hand_model.sensors == {"uskin-curved": built_in_sensor("uskin-curved")}
-        assert hand_model.rate == pytest.approx(150.0, rel=1e-3)
-        assert hand_model.debounce == Debounce(hysteresis=0.1, hold=0.1)
-
-    def test_it_detects_a_grasp(self):
-        grasp = synthetic_recording("grasp", 5, ("thumb", "ring"))
-        metrics = evaluate(Model.load("builtin:twin"), [grasp])
-        assert list(metrics.fingers) == ["thumb", "ring"]
-        assert metrics.pooled.accuracy > 75
-        assert metrics.pooled.auc_contact > 0.9
 
 
 def test_the_plan_takes_the_models_rate():

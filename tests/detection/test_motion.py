@@ -159,19 +159,6 @@ def test_do_not_depend_on_the_gain_of_the_sensor(factor, seed):
     )
 
 
-def test_do_not_depend_on_the_order_of_the_taxels():
-    given = sensor("uskin-4x4")
-    readings = walk(given, 80)
-    order = np.random.default_rng(0).permutation(16)
-    turned = Sensor(
-        "other", given.positions[order], given.rotations[order], given.normal, 100.0,
-        range=given.range,
-    )  # fmt: skip
-    np.testing.assert_allclose(
-        features_of(readings[:, order], turned), features_of(readings, given), atol=1e-9
-    )
-
-
 def test_do_not_depend_on_the_frame_of_the_sensor():
     given = sensor("papillarray")
     readings = walk(given, 80)
@@ -206,13 +193,6 @@ def test_a_stream_computes_only_the_families_that_it_needs():
     assert not stream_config(plan).lags["sliding"].any()
     plan = replace(plan, features={"a": SLIDING_FEATURES})
     assert not stream_config(plan).lags["has_changes"].any()
-
-
-@pytest.mark.parametrize("normal", [(0.6, 0.0, 0.8), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0)])
-def test_other_normals(normal):
-    given = replace(sensor("uskin-4x4"), normal=np.array(normal))
-    readings = walk(given, 60)
-    np.testing.assert_allclose(features_of(readings, given), naive(readings, given), atol=1e-6)
 
 
 def test_a_gap_begins_anew_but_the_load_stays():

@@ -24,8 +24,6 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
-from typer.main import get_command
-
 from holdfast.cli import app, main
 
 ROOT = Path(__file__).parents[2]
@@ -210,7 +208,10 @@ def check_options(block: Block) -> None:
         for part in re.split(r"[|&;]+", line):
             words = [word for word in shlex.split(part) if word not in ("uv", "run")]
             if words and Path(words[0]).name == "holdfast":
-                command = get_command(app._app(words[1:]))
-                with command.make_context("holdfast", words[1:]) as context:
-                    name, verb, rest = command.resolve_command(context, words[1:])
-                    verb.make_context(name, rest, parent=context)
+                two = " ".join(words[1:3])
+                verb = two if two in app.SUB_VERBS else words[1]
+                with redirect_stdout(io.StringIO()) as out:
+                    assert main([*verb.split(), "--help-all"]) == 0, f"{block.location}: {line}"
+                flags = {word.partition("=")[0] for word in words if word.startswith("--")}
+                unknown = flags - set(re.findall(r"--[\w-]+", out.getvalue()))
+                assert not unknown, f"{block.location}: {line}: {unknown}"

@@ -110,10 +110,3 @@ def test_one_table_may_be_a_file(tmp_path):
     with pytest.raises(OutputError, match="a folder expected"):
         export([recording, recording], tmp_path / "y.csv")
     assert [path.name for path in tmp_path.iterdir()] == ["x.csv"]
-
-
-def test_no_file_is_overwritten(tmp_path):
-    export([Recording("a", {"b": tactile()})], tmp_path / "out")
-    with pytest.raises(OutputError, match=r"a\.csv exists already"):
-        export([Recording(name, {"b": tactile()}) for name in ("0", "a")], tmp_path / "out")
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["a.csv"]

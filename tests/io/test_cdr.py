@@ -1,4 +1,3 @@
-import struct
 from contextlib import suppress
 
 import numpy as np
@@ -92,14 +91,3 @@ def test_the_bytes_are_those_that_rosbags_writes(both, given):
     theirs, ours, decode = both
     assert plain(decode(ours(given))) == given
     assert ours(given) == theirs(given)
-
-
-def test_values_that_do_not_fit():
-    encode = MessageEncoder(parse_definition("p/A", "uint8[2] pair"))
-    assert encode({"pair": np.array([1, 2])})[4:] == b"\x01\x02"
-    with pytest.raises(ValueError, match="pair: 2 values"):
-        encode({"pair": [1, 2, 3]})
-    with pytest.raises(struct.error):
-        encode({"pair": [1, 256]})
-    with pytest.raises(KeyError):
-        encode({})

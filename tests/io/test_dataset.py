@@ -25,11 +25,6 @@ def test_recordings_come_sorted_by_name(folder):
     assert isinstance(dataset[1:], Dataset)
 
 
-def test_it_reads_a_recording_each_time_it_is_asked(folder):
-    dataset = load_dataset(folder)
-    assert dataset[0] is not dataset[0]
-
-
 def test_other_files_are_ignored(folder):
     (folder / "model.json").write_text("{}")
     (folder / "b.labels.json.bak").write_text("{}")

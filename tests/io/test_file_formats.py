@@ -8,13 +8,11 @@ import msgspec
 import numpy as np
 import pytest
 
-from holdfast.contact import ContactState
 from holdfast.errors import OutputError, RecordingError
 from holdfast.io import load_recording, read_chunks, safe_reading, save_labels, save_recording
 from holdfast.io.header import encode_header
 from holdfast.io.mcap_writer import RecordingWriter
 from holdfast.labelling.server.workspace import summary_of
-from holdfast.recordings import Label
 
 
 @pytest.mark.parametrize("read", [load_recording, read_chunks])
@@ -48,21 +46,6 @@ def test_saving_with_an_unknown_suffix(make_recording, tmp_path):
         save_recording(make_recording(), tmp_path / "a.h5")
 
 
-@pytest.mark.parametrize("suffix", ["parquet", "mcap"])
-def test_step_and_rest_of_a_sensor_are_kept(make_recording, tmp_path, suffix):
-    recording = make_recording(150)
-    path = tmp_path / f"a.{suffix}"
-    save_recording(recording, path)  # without them
-    assert {m.sensor.step for m in load_recording(path).modules.values()} == {None}
-    modules = {
-        name: replace(module, sensor=replace(module.sensor, step=1.0, rests_at_zero=True))
-        for name, module in recording.modules.items()
-    }
-    save_recording(replace(recording, modules=modules), path, force=True)
-    for name, module in load_recording(path).modules.items():
-        assert module.sensor == modules[name].sensor
-
-
 def test_import_is_light():
     code = "import sys, holdfast.io; print({'pyarrow', 'mcap', 'h5py', 'scipy'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -87,18 +70,6 @@ def test_chunks_together_are_the_recording(make_recording, tmp_path, suffix, n_s
     assert [m for chunk in chunks for m in chunk.markers] == list(recording.markers)
     assert {chunk.name for chunk in chunks} == {recording.name}
     assert all(one.end < two.start for one, two in pairwise(chunks))
-
-
-@pytest.mark.parametrize("suffix", [".parquet", ".mcap"])
-def test_labels_of_the_label_file_are_cut_to_the_chunks(make_recording, tmp_path, suffix):
-    recording = make_recording()
-    path = tmp_path / f"a{suffix}"
-    save_recording(recording, path)
-    relabelled = recording.with_labels({"thumb": (Label(1.0, 3.0, ContactState.STABLE),)})
-    save_labels(relabelled, path)
-    states = [chunk.modules["thumb"].label_states for chunk in read_chunks(path, 100)]
-    want = relabelled.modules["thumb"].label_states
-    np.testing.assert_array_equal(np.concatenate(states), want)
 
 
 def test_a_live_recording_without_a_digest_takes_its_labels(make_recording, tmp_path):
@@ -235,13 +206,3 @@ def test_the_size_of_a_recording_that_is_loaded_is_limited(
         load_recording(path)
     chunks = read_chunks(path, 100)
     assert sum(chunk.modules["thumb"].n_samples for chunk in chunks) == module.n_samples
-
-
-def test_texts_of_parquet_count_as_long_as_the_longest(make_recording, tmp_path, monkeypatch):
-    texts = np.array(["free"] * 299 + ["x" * 4000])
-    recording = make_recording()
-    path = tmp_path / "a.parquet"
-    save_recording(replace(recording, truth=replace(recording.truth, hand={"a": texts})), path)
-    monkeypatch.setattr(safe_reading, "MAX_RECORDING", 4_700_000)
-    with pytest.raises(RecordingError, match="5 MB"):
-        load_recording(path)

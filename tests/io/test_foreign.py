@@ -15,7 +15,6 @@ from holdfast.children import python_command
 from holdfast.errors import RecordingError
 from holdfast.io import FORMATS, foreign, import_recordings
 from holdfast.io.importers import IMPORTER_PLUGINS
-from holdfast.sensors import flat_sensor
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="needs signals and pipes")
 
@@ -183,17 +182,6 @@ def test_every_format_is_read_in_the_child(tmp_path, monkeypatch, name, file):
     monkeypatch.setattr(foreign, "_PROGRAM", program + foreign._PROGRAM)
     with pytest.raises(RecordingError, match="SIGABRT"):
         list(import_recordings(tmp_path, name))
-
-
-def test_reports_of_the_child_precede_its_error(tmp_path, file):
-    for name, cell in (("a", "3"), ("b", "?")):
-        text = f"time,x1,y1,z1\n0,1,2,3\n0.01,1,2,{cell}\n"
-        (tmp_path / f"{name}.csv").write_text(text)
-    reports, sensors = [], {"*": flat_sensor("one", 1, 1, 0.001)}
-    with pytest.raises(RecordingError, match=r"b\.csv, row 3"):
-        list(import_recordings(tmp_path, sensors=sensors, report=reports.append))
-    assert len(reports) == 1
-    assert reports[0].startswith("a.csv: 100 Hz")
 
 
 @pytest.mark.parametrize("name", (*FORMATS, *IMPORTER_PLUGINS.names()))

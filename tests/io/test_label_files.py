@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import Cause, ContactState
-from holdfast.errors import OutputError, RecordingError
+from holdfast.errors import RecordingError
 from holdfast.io import (
     labels_from_csv,
     labels_path,
@@ -67,14 +67,6 @@ def test_a_cause_in_a_file_of_an_older_version_reads_as_what_it_was(saved, cause
     assert load_recording(path).modules["thumb"].labels == (label,)
 
 
-def test_they_fit_the_recording_in_the_other_format(saved, tmp_path):
-    recording, _ = saved
-    (tmp_path / "other").mkdir()
-    save_recording(recording.with_labels({}), tmp_path / "other" / "can.mcap")
-    labels_path(tmp_path / "can").rename(labels_path(tmp_path / "other" / "can"))
-    assert load_recording(tmp_path / "other" / "can.mcap").modules["thumb"].labels == MINE
-
-
 def test_labels_of_another_recording_are_refused(saved, make_recording):
     _, path = saved
     save_recording(make_recording(seed=1), path, force=True)
@@ -109,23 +101,6 @@ def test_wrong_label_files_are_refused(saved, change, text):
     with pytest.raises(RecordingError, match=re.escape(text)) as caught:
         load_recording(path)
     assert "can.labels.json" in str(caught.value)
-
-
-def test_labels_are_not_overwritten_unless_forced(saved):
-    recording, path = saved
-    with pytest.raises(OutputError, match="exists already"):
-        save_labels(recording, path)
-    save_labels(recording, path, force=True)
-
-
-@pytest.mark.parametrize(
-    "finger", ["=1+1", "+1", "-1", "@A1", "\t=1", "\r=1", "'=1", "a\rb", "'a'"]
-)
-def test_a_finger_is_no_formula_in_csv_and_comes_back(tmp_path, finger):
-    path = tmp_path / "labels.csv"
-    path.write_bytes(labels_to_csv({finger: MINE}).encode())
-    assert not path.read_text().splitlines()[1].startswith(("=", "+", "-", "@", "\t", "\r"))
-    assert list(labels_from_csv(path)) == [finger]
 
 
 def test_csv_goes_out_and_comes_in(tmp_path):

@@ -128,35 +128,6 @@ def test_flushed_samples_are_on_disk(tmp_path):
     assert (recording.complete, recording.modules["thumb"].n_samples) == (True, 30)
 
 
-def test_after_a_refusal_nothing_more_is_written(tmp_path, monkeypatch):
-    """An end would make a damaged file of one that is merely cut."""
-    path = tmp_path / "a.mcap"
-    writer = RecordingWriter(path, {"thumb": ANYSKIN})
-    writer.append("thumb", np.arange(100) * 0.01, readings(100))
-    writer.flush()
-    size = path.stat().st_size
-    disk = writer._log._stream._file
-
-    class Full:
-        fileno = staticmethod(disk.fileno)
-
-        def write(self, data):
-            if len(data) > 10:
-                return disk.write(data[:10])
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-    monkeypatch.setattr(writer._log._stream, "_file", Full())
-    with pytest.raises(OutputError, match="No space left on device"):
-        writer.mark(1.0, "full")
-    monkeypatch.undo()
-    for late in (lambda: writer.mark(1.0, "again"), writer.flush, writer.close):
-        with pytest.raises(OutputError, match="No space left on device"):
-            late()
-    assert size < path.stat().st_size == writer.n_bytes
-    recording = load_recording(path)
-    assert (recording.complete, recording.modules["thumb"].n_samples) == (False, 100)
-
-
 SENSORS = {"thumb": sensor("anyskin")}
 
 

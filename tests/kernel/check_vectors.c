@@ -1,6 +1,7 @@
 /* Hold the kernel and the detector equal to the vectors of write_vectors.py, without Python.
  *
- *     cc -std=c99 -I src/holdfast/kernel tests/kernel/check_vectors.c -o check -lm && ./check
+ *     python tests/kernel/write_vectors.py > vectors.h
+ *     cc -std=c99 -I src/holdfast/kernel -I . tests/kernel/check_vectors.c -o check -lm && ./check
  *
  * With -DHOLDFAST_VECTORS_LINKED the kernel is linked, its files compiled each by itself. With
  * -DHOLDFAST_VECTORS_FIXED the sizes are macros, as in an exported header; with

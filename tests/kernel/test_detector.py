@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from detection.detector.build import cause_head, lively, model
+from detection.detector.build import RATE, cause_head, lively, model
 from holdfast.contact import Cause
 from holdfast.detection import Detector
 from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.traces import EstimateTypes
-from holdfast.kernel import _extension
 from holdfast.kernel.structs import struct_type
+from kernel.extension import extension
 
 N = 3000
 EVERY_CAUSE = tuple(Cause)
@@ -33,11 +33,16 @@ def with_causes(**options):
     return replace(made_model, fingers=fingers, debounce=debounce)
 
 
-def made_kernel(plan, note):
+def plan_of(used):
+    return used.plan(dict.fromkeys(used.fingers, used.sensors["tiny"]), RATE)
+
+
+def made_kernel(note=print):
     """A detector of the extension that calls `note` at each change of state."""
+    plan = plan_of(with_causes())
     config = *packed(stream_config(plan)), plan.baseline.tobytes()
     types = EstimateTypes({name: index for index, name in enumerate(plan.fingers)}, note)
-    return _extension.Detector(*config, *packed(with_causes().config(plan)), types)
+    return extension.Detector(*config, *packed(with_causes().config(plan)), types)
 
 
 class TestEstimates:
@@ -70,26 +75,26 @@ class TestEstimates:
         assert {str(estimate.fingers["thumb"].state) for estimate in kept} == {"UNKNOWN"}
 
     def test_one_that_no_detector_made_has_no_fingers(self):
-        assert len(_extension.Estimates()) == 0
+        assert len(extension.Estimates()) == 0
         with pytest.raises(KeyError):
-            _extension.Estimates()["thumb"]
+            extension.Estimates()["thumb"]
 
     def test_they_have_the_layout_of_the_struct(self):
         kind = struct_type("holdfast_finger_estimate")
-        assert _extension.Estimates.__itemsize__ == kind.itemsize
+        assert extension.Estimates.__itemsize__ == kind.itemsize
 
 
 class TestDetector:
     @pytest.mark.parametrize("call", [copy.copy, copy.deepcopy, pickle.dumps])
     def test_it_cannot_be_copied(self, call):
         with pytest.raises(TypeError, match=r"cannot pickle .*Detector. object"):
-            call(Detector(with_causes())._kernel)
+            call(made_kernel())
 
     def test_another_thread_is_refused(self):
-        detector, refused, n = Detector(with_causes())._kernel, [], 20_000
+        detector, refused, n = made_kernel(), [], 20_000
         arguments = [
             np.ones((n, 4, 3)), np.ones((n, 2), dtype=bool), np.arange(float(n)),
-            np.zeros((n, 2 * _extension.Estimates.__itemsize__ // 8)), np.zeros(n),
+            np.zeros((n, 2 * extension.Estimates.__itemsize__ // 8)), np.zeros(n),
         ]  # fmt: skip
         for _ in range(50):  # until a call was made while the thread was inside one
             thread = threading.Thread(target=detector.run, args=arguments)
@@ -118,29 +123,26 @@ class TestDetector:
         ],
     )
     def test_rules_that_do_not_fit_are_refused(self, finger, head, field, value, wrong):
-        used = with_causes()
-        detector = Detector(used)
-        _, rules, weights = used.config(detector._plan)
+        used, kernel = with_causes(), made_kernel()
+        _, rules, weights = used.config(plan_of(used))
         (rules[finger] if head is None else rules[finger]["heads"][head])[field] = value
         with pytest.raises(ValueError, match=wrong):
-            detector._kernel.set_rules(rules.tobytes(), weights.tobytes())
-        assert detector.update({}, 1.0) is not None
+            kernel.set_rules(rules.tobytes(), weights.tobytes())
+        assert kernel.update({}, 1.0) is not None
 
     @pytest.mark.parametrize("n_rules", [1, 3])
     def test_rules_of_other_fingers_are_refused(self, n_rules):
-        used = with_causes()
-        detector = Detector(used)
-        _, rules, weights = used.config(detector._plan)
+        used, kernel = with_causes(), made_kernel()
+        _, rules, weights = used.config(plan_of(used))
         other = np.concatenate([rules, rules])[:n_rules]
         with pytest.raises(ValueError, match="rules: "):
-            detector._kernel.set_rules(other.tobytes(), weights.tobytes())
+            kernel.set_rules(other.tobytes(), weights.tobytes())
         with pytest.raises(ValueError, match="weights: "):
-            detector._kernel.set_rules(rules.tobytes(), weights[:-1].tobytes())
+            kernel.set_rules(rules.tobytes(), weights[:-1].tobytes())
         with pytest.raises(ValueError, match="a weight of a head"):
-            detector._kernel.set_rules(rules.tobytes(), (weights * np.nan).tobytes())
+            kernel.set_rules(rules.tobytes(), (weights * np.nan).tobytes())
 
     def test_a_change_cannot_call_the_detector(self):
-        detector = Detector(with_causes())
         refused = []
 
         def note(change):
@@ -149,7 +151,7 @@ class TestDetector:
             except RuntimeError as error:
                 refused.append(str(error))
 
-        kernel = made_kernel(detector._plan, note)
+        kernel = made_kernel(note)
         for k, sample in enumerate(lively(60)):
             kernel.update({"thumb": sample, "index": sample + 1.0}, k / 100)
         assert set(refused) == {"another thread is using this detector"}
@@ -160,7 +162,7 @@ class TestDetector:
                 pass
 
         note = Note()
-        note.kernel = made_kernel(Detector(with_causes())._plan, note)
+        note.kernel = made_kernel(note)
         dead = weakref.ref(note)
         del note
         gc.collect()

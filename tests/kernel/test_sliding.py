@@ -9,11 +9,8 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Tare
 from holdfast.detection.features import extract
-from holdfast.detection.kernel_config import stream_config
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import (
-    ANY_FEATURES,
-    SLIDING_CHOICE,
     SLIDING_FEATURES,
     SLIDING_LAGS,
     ZERO_KINDS,
@@ -244,16 +241,6 @@ def test_equal_the_definitions_without_a_known_zero():
     assert (np.abs(found - known)[-60:, changes] > 0.1).any()  # the load is that which went
 
 
-@pytest.mark.parametrize("rate", [30.0, 150.0, 500.0])
-def test_equal_the_definitions_at_other_rates(rate):
-    sensor = made("uskin-curved")
-    readings, times = walk(sensor, 1, n=int(4 * rate), rate=rate, uneven=0.05)
-    np.testing.assert_allclose(
-        features_of(readings, times, sensor, rate), naive(readings, times, sensor, rate),
-        rtol=1e-9, atol=1e-9,
-    )  # fmt: skip
-
-
 def test_one_taxel_has_those_that_compare_none():
     sensor = made("one")
     specs = tuple(spec for spec in SLIDING_FEATURES if spec.min_taxels == 1)
@@ -293,21 +280,3 @@ def test_signs_tell_a_press_from_a_pull_and_a_release(push, signs):
     specs = tuple(FeatureSpec(kind, transform="relative", seconds=0.1) for kind in signs)
     found = features_of(readings, np.arange(120) / RATE, sensor, specs=specs)[100]
     assert np.sign(np.round(found, 2)).tolist() == list(signs.values())
-
-
-def test_a_stream_computes_only_the_kinds_that_it_needs():
-    plan = StreamPlan(
-        {"a": made("uskin-4x4")}, {"a": SLIDING_CHOICE}, 14, Tare.parse("first"), RATE
-    )
-    config = stream_config(plan)
-    assert sum(int(kinds).bit_count() for kinds in config.lags["sliding"]) == len(SLIDING_CHOICE)
-    assert config.hand["n_slides"] == config.hand["n_track"] == 2 * round(0.533 * RATE) + 1
-    plan = replace(plan, features={"a": ANY_FEATURES})
-    assert stream_config(plan).hand["n_slides"] == 0
-
-
-def test_the_lists():
-    assert (len(SLIDING_FEATURES), len(set(SLIDING_FEATURES))) == (97, 97)
-    assert len(SLIDING_CHOICE) == 32
-    assert set(SLIDING_CHOICE) < set(SLIDING_FEATURES)
-    assert sum(spec.kind not in ZERO_KINDS for spec in SLIDING_FEATURES) == 92

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from holdfast.detection.kernel_config import packed, stream_config
-from holdfast.kernel import _extension
+from kernel.extension import extension
 from kernel.random_streams import random_plan, random_rows
 
 N = 400
@@ -28,7 +28,7 @@ def config_of(plan):
 
 
 def started(plan):
-    return _extension.Stream(*config_of(plan))
+    return extension.Stream(*config_of(plan))
 
 
 def advanced(c, plan, samples):
@@ -172,7 +172,7 @@ def test_constants_of_another_size_are_refused(name):
     config = config_of(made()[0])
     config[index] = change(config[index])
     with pytest.raises((TypeError, ValueError), match=f"^{message}"):
-        _extension.Stream(*config)
+        extension.Stream(*config)
 
 
 @pytest.mark.parametrize("field", ["n_fingers", "n_lanes", "n_features", "n_lags"])
@@ -182,12 +182,12 @@ def test_sizes_whose_product_would_overflow_are_refused(field, size):
     config = stream_config(plan)
     config.hand[field] = size
     with pytest.raises(ValueError, match="n_fingers, n_lanes, n_features or n_lags is too large"):
-        _extension.Stream(*packed(config), plan.baseline.tobytes())
+        extension.Stream(*packed(config), plan.baseline.tobytes())
 
 
 def test_a_stream_takes_eight_arguments_without_names():
     config = config_of(made()[0])
     with pytest.raises(TypeError, match="8 arguments expected, 7 given"):
-        _extension.Stream(*config[:-1])
+        extension.Stream(*config[:-1])
     with pytest.raises(TypeError, match="no arguments by name expected"):
-        _extension.Stream(hand=config[0])
+        extension.Stream(hand=config[0])

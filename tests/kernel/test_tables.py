@@ -6,8 +6,8 @@ from holdfast.detection import Tare
 from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.plan import StreamPlan
 from holdfast.detection.specs import ANY_FEATURES, HOLDFAST_FEATURES
-from holdfast.kernel import _extension
 from holdfast.sensors import sensor
+from kernel.extension import extension
 
 PATCH = sensor("uskin-4x4")
 HUGE = 2**64 - 1
@@ -35,7 +35,7 @@ def refused(plan, field, value):
     else:
         config.hand[0][last] = value
     with pytest.raises(ValueError) as raised:
-        _extension.Stream(*packed(config), plan.baseline.tobytes())
+        extension.Stream(*packed(config), plan.baseline.tobytes())
     return str(raised.value).removeprefix("constants that do not fit: ")
 
 
@@ -115,13 +115,13 @@ class TestCheck:
     def test_a_set_holds_512_taxels(self):
         plan = StreamPlan({"f": made(512)}, {"f": HOLDFAST_FEATURES}, 14, Tare.parse("first"), 100)
         config = stream_config(plan)
-        _extension.Stream(*packed(config), plan.baseline.tobytes())  # 512
+        extension.Stream(*packed(config), plan.baseline.tobytes())  # 512
         config.hand["n_lanes"] = 516
         config.fingers["n_taxels"], config.fingers["n_used"] = 513, 513.0
         used = (np.arange(516) < 513).astype(float)
         wide = config._replace(used=used, rotations=np.zeros(9 * 516), positions=np.zeros(3 * 516))
         with pytest.raises(ValueError, match="first, first_taxel or n_taxels of a finger"):
-            _extension.Stream(*packed(wide), bytes(513 * 24))
+            extension.Stream(*packed(wide), bytes(513 * 24))
 
     def test_normals_are_finite(self, plan):
         normal = (0.0, 1.0, np.inf)

@@ -1,9 +1,8 @@
 """Write vectors.h: the tables of a small hand and its model, samples, and estimates of them.
 
-    python tests/kernel/write_vectors.py > tests/kernel/vectors.h
+    python tests/kernel/write_vectors.py > vectors.h
 
-`check_vectors.c` holds the kernel equal to them, without Python. Write them again only if the
-mathematics or the numbers of kinds change.
+`check_vectors.c` holds a kernel of any compiler equal to them, without Python.
 """
 
 import re
@@ -23,9 +22,9 @@ from holdfast.detection.c_header import Tables, kernel_text
 from holdfast.detection.kernel_config import packed, stream_config
 from holdfast.detection.specs import RELATIVE_KINDS, FeatureSpec
 from holdfast.detection.traces import EstimateTypes
-from holdfast.kernel import _extension
 from holdfast.kernel.structs import struct_type
 from holdfast.sensors import Sensor
+from kernel.extension import extension
 
 RATE, N_SAMPLES, EVERY = 30.0, 260, 10
 """Samples per second [Hz], their number, and the distance of those whose features are written."""
@@ -115,10 +114,10 @@ def estimates_of(used, plan, rows):
     readings, present, times = (np.array(column) for column in zip(*rows, strict=True))
     config = *packed(stream_config(plan)), plan.baseline.tobytes()
     features = np.empty((*present.shape, plan.width))
-    _extension.Stream(*config).advance(readings, present, times, features, np.empty(present.shape))
+    extension.Stream(*config).advance(readings, present, times, features, np.empty(present.shape))
     indices = {name: index for index, name in enumerate(plan.fingers)}
     types = EstimateTypes(indices, lambda change: None)
-    kernel = _extension.Detector(*config, *packed(used.config(plan)), types)
+    kernel = extension.Detector(*config, *packed(used.config(plan)), types)
     estimates = np.zeros(present.shape, struct_type("holdfast_finger_estimate"))
     hand = np.empty(len(times))
     kernel.run(readings, present, times, estimates.view(np.float64), hand)
@@ -144,7 +143,7 @@ def main():
         if k % EVERY == 0:
             numbers += map(number, features[k].ravel().tolist())
     parts = [
-        "/* Written by write_vectors.py; do not edit. */\n",
+        "/* Written by write_vectors.py. */\n",
         "#ifdef HOLDFAST_VECTORS_FIXED\n",
         *(f"#define HOLDFAST_{name.upper()} {n}\n" for name, n in made.sizes.items()),
         '#endif\n#ifdef HOLDFAST_VECTORS_LINKED\n#include "holdfast.h"\n',

@@ -69,14 +69,6 @@ def test_fingers_with_the_same_fault_share_a_notice():
     assert [one for _, one in found] == [Problem(Fault.LATE, ("ring",))]
 
 
-def test_times_that_go_back_do_no_harm():
-    watch = FaultWatch()
-    run(watch, 100.0, 1.0, thumb=LATE)
-    run(watch, 0.0, 1.0, thumb=())
-    run(watch, 1.0, 1.0, thumb=LATE)
-    assert watch.current == [Problem(Fault.LATE, ("thumb",))]
-
-
 def test_invalid_readings_of_single_samples_are_reported_when_they_are_many():
     watch, found = FaultWatch(), []
     for k in range(2000):

@@ -74,12 +74,6 @@ def test_a_touched_hand_is_refused():
         health(turned, replace(PATCH, magnetic=False))
 
 
-def test_one_taxel_is_said():
-    one = type(PATCH)("one", PATCH.positions[:1], PATCH.rotations[:1], PATCH.normal, 100.0)
-    (text,) = findings_of(check(index=health(open_hand()[:, :1], one)))
-    assert text.startswith("index has one taxel")
-
-
 def test_a_source_is_read_for_some_seconds(tmp_path):
     path = tmp_path / "open.parquet"
     save_recording(Recording("open", {"index": Tactile(PATCH, TIMES, open_hand())}), path)

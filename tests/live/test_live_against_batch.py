@@ -91,9 +91,3 @@ def test_windows_in_seconds_give_the_same_at_other_times(times_of, most):
     )
     np.testing.assert_array_equal(np.isnan(mine), np.isnan(other))
     assert np.nanmax(np.abs(mine - other)) <= most
-
-
-def test_windows_in_samples_give_others_where_the_rate_changes():
-    """As `docs/live.md` says."""
-    mine, other = both_of("builtin:noise-floor", bursts)
-    assert np.mean([a.state != b.state for a, b in zip(mine, other, strict=True)]) > 0.01

@@ -56,16 +56,6 @@ def test_what_never_changes():
     assert notices(np.full((len(TIMES), 16, 3), 1000)) == []  # the fault `dead`
 
 
-@pytest.mark.parametrize(("force", "n"), [(1.0, 0), (5.0, 1)])
-def test_the_shear_of_a_light_touch_is_less_than_a_step(force, n):
-    """A sensor of 0.1 N steps shows the shear of a firm touch, or it has none."""
-    readings = np.zeros((1000, 87, 3))
-    readings[200:, 40, 2] = force
-    monitor = ReadingsMonitor({"index": sensor("orca-finger")})
-    found = [x for k, one in enumerate(readings) for x in monitor.update({"index": one}, k / 100)]
-    assert len(found) == n
-
-
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 def test_z_that_points_inwards(noise):
     ((text, time),) = notices(grasp(noise) * [1, -1, -1])

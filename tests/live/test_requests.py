@@ -33,15 +33,6 @@ def test_a_request_that_fails_or_was_cancelled_and_the_others_go_on():
     assert (calls, other.result(0)) == ([1], None)
 
 
-def test_a_request_of_a_request_waits_for_the_next_time():
-    requests, calls = RequestQueue(), []
-    requests.append(lambda: requests.append(lambda: calls.append(1)))
-    requests.carry_out()
-    assert calls == []
-    requests.carry_out()
-    assert calls == [1]
-
-
 def test_requests_of_many_threads():
     requests, calls = RequestQueue(), []
     threads = [

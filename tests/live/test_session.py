@@ -7,7 +7,7 @@ import pytest
 
 from holdfast.detection import detect
 from holdfast.errors import ModelError, SourceError, StreamError
-from holdfast.live.session import SWITCH_INTERVAL, InterpreterSettings, Session
+from holdfast.live.session import SWITCH_INTERVAL, Session
 from holdfast.live.stream_detector import StreamDetector
 
 from . import build
@@ -194,16 +194,3 @@ def test_the_settings_of_python_are_those_of_before_when_the_last_session_stops(
     second.stop()
     assert sys.getswitchinterval() == pytest.approx(own_settings)
     assert gc.get_freeze_count() <= n_frozen
-
-
-def test_settings_of_the_program_meanwhile_stay(own_settings):
-    settings = InterpreterSettings()
-    gc.freeze()
-    try:
-        settings.begin()
-        sys.setswitchinterval(0.003)
-        settings.end()
-        assert sys.getswitchinterval() == pytest.approx(0.003)
-        assert gc.get_freeze_count() > 0
-    finally:
-        gc.unfreeze()

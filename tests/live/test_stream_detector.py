@@ -2,13 +2,12 @@ import math
 import time
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detection import Detector, detect
-from holdfast.errors import ModelError, StreamError
+from holdfast.errors import StreamError
 from holdfast.live.source_filter import MAX_BUFFERED_ARRIVALS
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording
@@ -61,11 +60,6 @@ def test_a_source_of_another_rate_is_resampled_as_the_recording_is():
         np.testing.assert_allclose(forces, trace.force[:n], rtol=1e-6, atol=1e-6)
 
 
-def test_strict_refuses_a_source_of_another_rate():
-    with pytest.raises(ModelError, match=r"75 Hz given.*--rate resample"):
-        detected(slower(2), strict=True)
-
-
 def test_arrivals_are_buffered_until_the_rate_is_known():
     arrivals = build.arrivals_of(build.grasp())
     detector = StreamDetector(build.model(), build.Script.of(build.grasp()))
@@ -74,13 +68,6 @@ def test_arrivals_are_buffered_until_the_rate_is_known():
     assert 70 <= first <= 76
     assert len(found[first]) == first + 1
     assert detector.rate == pytest.approx(150.0)
-
-
-def test_a_source_that_ends_early_has_estimates_too():
-    recording = build.grasp()
-    _, estimates = detected(recording, steps=build.arrivals_of(recording)[:20])
-    assert len(estimates) == 20
-    assert estimates[-1].estimate.fingers["thumb"].reason is Reason.TARE
 
 
 def test_a_fault_of_the_transport_makes_its_finger_unknown_until_the_next_sample():
@@ -189,26 +176,6 @@ def test_tared_readings_begin_at_zero():
     assert all(np.abs(values).max() < 10 for values in tared.values())
 
 
-def test_a_tare_by_interval_is_refused():
-    model = msgspec.structs.replace(build.model(), tare="0:1")
-    with pytest.raises(ModelError, match="0:1"):
-        StreamDetector(model, build.Script.of(build.grasp()))
-
-
-def test_ignored_taxels_cause_no_fault():
-    recording = build.grasp()
-    steps = build.arrivals_of(recording)
-    for k, arrival in enumerate(steps):
-        spoilt = arrival.samples["thumb"].copy()
-        spoilt[3] = 65535 if k > 300 else spoilt[3]
-        steps[k] = arrival._replace(samples={**arrival.samples, "thumb": spoilt})
-    _, spoilt = detected(recording, steps=list(steps))
-    assert spoilt[-1].estimate.fingers["thumb"].faults == (Fault.SATURATED,)
-    assert spoilt[-1].estimate.fingers["thumb"].faulty_taxels == (3,)
-    _, healthy = detected(recording, steps=list(steps), ignore={"thumb": (3,)})
-    assert healthy[-1].estimate.fingers["thumb"].faults == ()
-
-
 class NoticesOnly(build.Script):
     """Sends arrivals without samples, without end and without a pause."""
 
@@ -302,18 +269,6 @@ def test_a_detector_fed_without_it_refuses_unused_modules_and_does_not_resample(
     assert stream.rate == pytest.approx(60.0)
     assert np.median(np.diff(times)) == pytest.approx(1 / 150)
     assert len(times) > 2 * n_instants
-
-
-def test_events_are_the_changes_of_the_estimates():
-    stream = StreamDetector(build.model(), build.Script.of(build.grasp()))
-    updates = []
-    while not stream.source.ended:
-        updates.append(stream.read())
-    events = [event for update in updates for event in update.events if event.finger == "thumb"]
-    states = [one.estimate.fingers["thumb"].state for u in updates for one in u.estimates]
-    changed = [state for k, state in enumerate(states) if k and state is not states[k - 1]]
-    assert [event.state for event in events] == changed
-    assert events[0].previous is ContactState.UNKNOWN
 
 
 def test_changes_that_lasted_are_fewer_than_changes():

@@ -98,11 +98,3 @@ class TestSummary:
         np.testing.assert_allclose(
             grouped.intervals.accuracy, alone.intervals.accuracy, atol=0.5 * width
         )
-
-    def test_memory_does_not_grow_with_the_samples(self, monkeypatch):
-        monkeypatch.setattr(summary, "MAX_EXACT_SCORES", 100)
-        total = summary.ResultTotal()
-        for each in recordings(5, n_samples=500):
-            total.add(summary.score_recording(each))
-        totals = (*total.fingers.values(), total.pooled, *(g.samples for g in total.groups))
-        assert all(isinstance(each.samples, BinnedSamples) for each in totals)

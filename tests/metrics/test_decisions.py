@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
-from holdfast.metrics import Decisions, FingerDecisions, hand_decisions
+from holdfast.metrics import FingerDecisions, hand_decisions
 
 from . import naive
 
@@ -30,12 +30,6 @@ def test_one_finger_holds_where_the_model_has_one():
     thumb = finger([0.0], [STABLE])
     assert hand_decisions({"thumb": thumb}, 1).states.tolist() == [STABLE]
     assert hand_decisions({"thumb": thumb}, 4).states.tolist() == [NO_CONTACT]
-
-
-def test_labels_and_states_are_kept_apart():
-    thumb = finger([0.0], [STABLE], labels=[UNSTABLE])
-    hand = Decisions.of("grasp", {"thumb": thumb}, 1).hand
-    assert (hand.labels.tolist(), hand.states.tolist()) == ([UNSTABLE], [STABLE])
 
 
 def test_no_fingers_make_an_empty_hand():

@@ -56,12 +56,6 @@ def test_a_quantile_is_that_of_the_values_of_the_recordings_drawn():
     assert quantile_of(values, 0.95)(draws) == pytest.approx(expected)
 
 
-def test_a_resample_without_values_is_left_out():
-    only_first = quantile_of([np.array([2.0]), np.empty(0)], 0.5)
-    assert np.isnan(only_first(np.array([[0.0, 2.0]]))).all()
-    assert bootstrap_interval(only_first, 2) == (2.0, 2.0)
-
-
 def test_an_end_may_be_infinite():
     delays = quantile_of([np.array([0.1]), np.array([np.inf])], 0.5)
     assert bootstrap_interval(delays, 2) == (0.1, None)

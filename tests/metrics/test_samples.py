@@ -95,13 +95,6 @@ def test_pooled_samples_equal_all_samples(samples, cut):
     assert pooled.brier == (None if whole.brier is None else pytest.approx(whole.brier))
 
 
-@given(st.lists(sample, min_size=2, max_size=40))
-def test_scores_count_by_their_order_alone(samples):
-    labels, states, scores = columns(samples)
-    bent = sample_metrics(labels, states, scores**3)
-    assert bent.auc == sample_metrics(labels, states, scores).auc
-
-
 def test_calibration_sums_by_hand():
     labels, states = [STABLE, UNSTABLE, STABLE, STABLE], [STABLE, STABLE, UNSTABLE, UNKNOWN]
     finger = FingerDecisions(np.arange(4.0), labels, states, [0.95, 0.91, 0.05, np.nan])

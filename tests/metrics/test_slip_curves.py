@@ -12,7 +12,6 @@ from holdfast.metrics.slip_curves import (
     held_out_indices,
     slip_curve,
     slip_intervals,
-    slip_summary,
     summarise_choice,
 )
 from holdfast.metrics.slip_truth import NOT_HELD, SlipDecisions
@@ -129,24 +128,6 @@ class TestThresholds:
     def test_no_threshold_where_nothing_is_held(self):
         codes = np.full(1000, NOT_HELD, dtype=np.int8)
         assert choose_threshold(slip_curve(decisions([], codes=codes)), CHOICE) is None
-
-    def test_intervals_without_a_choice_are_those_of_the_threshold(self):
-        single = [curve[60].as_curve for curve in self.curves]
-        found = slip_intervals(single, n=200)
-        summary = slip_summary([{"thumb": curve[0]} for curve in single], found)
-        low, high = found.incipient["0.1"]
-        assert low <= summary.pooled.incipient["0.1"] <= high
-        assert summary.intervals == found
-
-    def test_intervals_at_the_threshold_of_training_recordings(self):
-        """Equal training recordings give the same threshold in every resample."""
-        tested = [{"thumb": curve} for curve in self.curves[:4]]
-        index = choose_threshold(self.curves[5], CHOICE)
-        same = [{"thumb": self.curves[5]}] * 3
-        found = summarise_choice(tested, CHOICE, training=same).intervals
-        assert found == slip_intervals([curve[index].as_curve for curve in self.curves[:4]])
-        varied = [{"thumb": curve} for curve in self.curves[4:]]
-        assert summarise_choice(tested, CHOICE, training=varied).intervals != found
 
     def test_no_interval_of_one_recording(self):
         assert slip_intervals(self.curves[:1]) is None

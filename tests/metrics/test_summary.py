@@ -1,4 +1,3 @@
-import weakref
 from dataclasses import replace
 
 import msgspec
@@ -158,21 +157,6 @@ def test_fingers_may_differ_between_recordings():
     metrics = summarise([decisions(1, ("thumb",)), decisions(2, ("thumb", "ring"))])
     assert list(metrics.fingers) == ["thumb", "ring"]
     assert metrics.fingers["ring"].n == metrics.recordings[1].fingers["ring"].n
-
-
-def test_samples_of_earlier_recordings_are_released():
-    seen = []
-
-    def stream():
-        for seed in range(6):
-            alive = sum(ref() is not None for ref in seen)
-            assert alive <= 1
-            each = decisions(seed)
-            seen.append(weakref.ref(each))
-            yield each
-            del each
-
-    assert len(summarise(stream(), n_resamples=10).recordings) == 6
 
 
 @settings(max_examples=10)

@@ -166,14 +166,6 @@ def test_a_disturbance_lasts_from_its_first_touch_to_its_last(push, touched):
     assert phases_from_touch(np.array(plan, dtype=str), forces, 0.05).tolist() == wanted
 
 
-def test_each_disturbance_is_limited_to_its_touches_and_keeps_its_slips():
-    plan = [Phase.DISTURBED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.DISTURBED]
-    touched = phases_from_touch(np.array(plan, dtype=str), np.array([0.0, 1, 1, 1, 0]), 0.05)
-    assert touched.tolist() == [
-        Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED, Phase.SLIPPING, Phase.LOCKED
-    ]  # fmt: skip
-
-
 def test_a_slip_in_a_disturbance_is_an_interval_of_its_own():
     data = truth(*disturbed((1.0, 1.0), (4.0, 1.0)), slip=[(1.4, 1.45, 0.02)])
     rows = [row for row in label_rows(data) if row[2] == U]
@@ -194,21 +186,6 @@ def test_a_shake_does_not_flicker():
     disturbances = [(1.0 + 0.2 * k, 0.1) for k in range(10)]
     data = truth(*disturbed(*disturbances), slip=[(s, s + 0.02, 0.05) for s, _ in disturbances])
     assert [row[2] for row in joined(label_rows(data))] == [S, U, S]
-
-
-@pytest.mark.parametrize("seconds", [0.02, 0.08])
-def test_a_very_short_contact_is_ignored(seconds):
-    spans = ((3.0, Phase.FREE, False),)
-    assert label_rows(truth(*spans, force=[(1.0, 1.0 + seconds, 1.0)])) == [(0.0, 3.0, N, None)]
-    lifted = truth(*disturbed(), force=[(1.0, 1.0 + seconds, 0.0)])
-    assert label_rows(lifted) == [(0.0, 6.0, S, None)]
-
-
-def test_a_finger_that_leaves_for_long_has_no_contact():
-    rows = label_rows(truth(*disturbed(), force=[(1.0, 2.0, 0.0)]))
-    assert [row[2] for row in rows] == [S, N, S]
-    assert rows[1][:2] == (1.0, 2.0)
-    assert rows[1][3] is None
 
 
 def test_an_object_that_falls_is_lost():
@@ -297,10 +274,6 @@ class TestGlitch:
         rows = label_rows(truth(*disturbed(), glitch=[(2.0, 2.02)], slip=[(2.05, 2.3, 0.01)]))
         assert [row[3] for row in rows] == [None, Cause.GLITCH, None]
         assert rows[1][1] == pytest.approx(2.3, abs=0.011)
-
-    def test_in_a_disturbance_it_is_part_of_that(self):
-        rows = label_rows(truth(*disturbed((2.0, 1.0)), glitch=[(2.5, 2.52)]))
-        assert [row[3] for row in rows] == [None, Cause.DISTURBANCE, None]
 
     def test_is_not_labelled_where_the_rule_leaves_it_out(self):
         rule = LabelRule(glitch=None)

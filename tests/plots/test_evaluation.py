@@ -69,40 +69,6 @@ def test_incomplete_decisions_can_be_drawn(decisions):
     draw(decisions).savefig(io.BytesIO(), format="png")
 
 
-def test_recordings_are_sorted_with_the_best_on_top():
-    decisions = [
-        Decisions.of(name, {"thumb": finger(k, delay=delay)}, 1)
-        for k, (name, delay) in enumerate([("late", 0.4), ("prompt", 0.0), ("middling", 0.2)])
-    ]
-    axes = draw(decisions).axes[0]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["late", "middling", "prompt"]
-
-
-def test_a_dot_stands_at_the_accuracy_of_its_finger():
-    decisions = example_decisions(3)
-    metrics = summarise(decisions, n_resamples=10)
-    dots = draw_evaluation(metrics, decisions).axes[0].collections
-    for name, drawn in zip(("thumb", "index"), dots, strict=True):
-        expected = sorted(each.fingers[name].accuracy for each in metrics.recordings)
-        assert sorted(drawn.get_offsets()[:, 0]) == pytest.approx(expected)
-
-
-def test_the_curve_of_the_hand_reaches_the_detected_fraction():
-    """Alarms 0.05 s late in four of five recordings, never in the fifth."""
-    decisions = example_decisions(4, delay=0.05)
-    silent = finger(9)
-    never = np.where(silent.states == UNKNOWN, UNKNOWN, STABLE)
-    score = np.where(silent.states == UNKNOWN, np.nan, 0.9)
-    deaf = FingerDecisions(silent.times, silent.labels, never, score)
-    decisions.append(Decisions.of("deaf", {"thumb": deaf, "index": deaf}, 2))
-    axes = draw(decisions).axes[3]
-    hand = max(axes.lines, key=lambda line: line.get_linewidth())
-    times, share = hand.get_data()
-    assert share[times < 0.049].max() == 0.0
-    assert share[-1] == pytest.approx(0.8)
-    assert axes.get_title(loc="left") == "alarms of the hand: 5 events, 0.0 false alarms/min"
-
-
 def test_calibration_by_hand():
     labels = np.array([STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, STABLE])
     states = np.array([STABLE, STABLE, STABLE, NO_CONTACT, STABLE, UNKNOWN])

@@ -45,14 +45,6 @@ def test_forces_and_sigma_are_drawn_unchanged(grasp):
     np.testing.assert_array_equal(sigma, haar_features(force)[:, 5])
 
 
-def test_labels_are_shaded_and_in_the_legend(grasp):
-    figure = plot_recording(grasp)
-    assert legend(figure)[4:] == ["stable", "unstable", "no contact"]
-    assert len(figure.axes[0].patches) == len(grasp.modules["thumb"].labels)
-    bare = grasp.with_labels({})
-    assert len(legend(plot_recording(bare))) == 4
-
-
 def test_slip_is_drawn_if_it_is_known(grasp):
     times = grasp.modules["thumb"].times
     truth = Truth(times, {}, {"thumb": {"slip_speed": 0.001 * times}})
@@ -73,34 +65,6 @@ def test_a_gap_interrupts_the_curves(grasp):
     sigma = drawn(figure.axes[1])["#333333"].get_ydata()
     assert np.isnan(sigma[700:714]).all()
     assert np.isfinite(sigma[714])
-
-
-def test_sigma_of_wide_range_is_logarithmic(grasp):
-    assert plot_recording(grasp).axes[1].get_yscale() == "linear"
-    thumb = grasp.modules["thumb"]
-    readings = thumb.readings.astype(float)
-    readings[900:905] += 5000
-    hit = Recording("hit", {"thumb": replace(thumb, readings=readings)})
-    assert plot_recording(hit).axes[1].get_yscale() == "log"
-
-
-def test_time_since_1970_counts_from_the_start(grasp):
-    modules = {
-        name: replace(m, times=m.times + 1.6e9, labels=()) for name, m in grasp.modules.items()
-    }
-    figure = plot_recording(replace(grasp, modules=modules))
-    assert figure.axes[0].get_xlim()[0] == 0
-    assert figure.axes[-1].get_xlabel() == "time since 1600000000.000 s [s]"
-
-
-@pytest.mark.parametrize("n_fingers", [1, 5])
-@pytest.mark.filterwarnings("error")
-def test_any_number_of_fingers(grasp, n_fingers, tmp_path):
-    thumb = grasp.modules["thumb"]
-    many = Recording("many", {f"finger{k + 1}": thumb for k in range(n_fingers)})
-    figure = plot_recording(many)
-    assert titles(figure) == list(many.modules)
-    figure.savefig(tmp_path / "a.svg")
 
 
 @pytest.mark.parametrize("readings", [np.full((1, 5, 3), 7.0), np.full((60, 5, 3), np.nan)])

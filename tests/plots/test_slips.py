@@ -1,7 +1,6 @@
 """Panels about slips: what is drawn is what was counted and decided."""
 
 from dataclasses import replace
-from typing import get_args
 
 import numpy as np
 import pytest
@@ -11,10 +10,9 @@ from msgspec.structs import replace as replace_fields
 from holdfast.detection import Model
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast.metrics.slip_truth import SLIDING, STILL, Slip, SlipDecisions, SlipTruth
-from holdfast.metrics.truth_labels import ORIGINS, Onsets
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
-from holdfast.plots.slips import draw_slips_found, slip_series
+from holdfast.plots.slips import draw_slips_found
 from holdfast.recordings import Truth
 from holdfast.synthetic import synthetic_recording
 
@@ -50,13 +48,6 @@ def test_the_share_found_over_time():
     assert axes.get_xlim() == (-0.1, 0.3)
 
 
-@pytest.mark.parametrize("origin", get_args(Onsets))
-def test_slips_of_each_origin_are_drawn(origin):
-    made = [decisions(0.02, origin=origin)]
-    figure = draw_evaluation(summarise(made, n_resamples=10), made)
-    assert figure.axes[-2].get_title("left") == f"slips of fingers: 1 {ORIGINS[origin]}"
-
-
 def test_an_evaluation_has_two_panels_of_slips_only_if_they_are_scored():
     made = [decisions(0.02), decisions(0.1)]
     metrics = summarise(made, n_resamples=10)
@@ -84,19 +75,6 @@ def model():
     rule = replace_fields(part.stable.rule, weights=(tuple(-value for value in weights),))
     slip = replace_fields(part.stable, name="slip", rule=rule, hold=0.1)
     return replace_fields(built_in, fingers={"*": part.with_heads(slip)})
-
-
-def test_decisions_stand_below_the_truth(grasp, model):
-    figure = plot_recording(grasp, model=model)
-    labels = [axes.get_ylabel() for axes in figure.axes]
-    assert labels[:4] == ["force [counts]", "σ [counts]", "slip [mm/s]", "p(slip)"]
-    series = slip_series(model, grasp)["thumb"]
-    assert series.raised.any()
-    drawn = max(figure.axes[3].get_lines(), key=lambda line: len(line.get_xdata()))
-    np.testing.assert_array_equal(drawn.get_ydata(), series.probability)
-    n_runs = np.count_nonzero(np.diff(series.raised.astype(int), prepend=0) == 1)
-    assert len(figure.axes[2].patches) == len(figure.axes[3].patches) == n_runs
-    assert "slides (decided)" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_without_a_truth_decisions_are_drawn_alone(grasp, model):

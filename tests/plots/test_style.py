@@ -4,15 +4,8 @@ import sys
 import pytest
 
 from holdfast.io import save_recording
-from holdfast.plots.style import PAPER, page_figure, series_styles
+from holdfast.plots.style import page_figure
 from holdfast.synthetic import synthetic_recording
-
-
-def test_eighteen_styles_are_different():
-    styles = series_styles(f"method {k}" for k in range(18))
-    assert len(set(styles.values())) == 19  # and the paper's
-    assert series_styles(["a", PAPER, "b"])["b"] == series_styles(["a", "b"])["b"]
-
 
 DRAWINGS = {
     "a verb": "from holdfast.cli import main; main(['info', 'grasp.parquet', '--plot', 'it.png'])",

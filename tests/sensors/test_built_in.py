@@ -131,24 +131,6 @@ class TestAllegro:
             3,
         ]
 
-    @pytest.mark.parametrize(
-        ("module", "taxel", "flat"),
-        [
-            ("thumb", 1, 4),
-            ("thumb", 2, 0),
-            ("thumb", 30, 61),
-            ("index", 1, 66),
-            ("index", 2, 62),
-            ("middle", 1, 164),
-            ("ring", 1, 278),
-            ("ring", 30, 367),
-            ("thumb/2", 1, 9),
-            ("palm/2", 1, 122),
-        ],
-    )
-    def test_known_flat_indices(self, module, taxel, flat):
-        assert hand("allegro-uskin").modules[module].flat_indices[taxel - 1] == flat
-
     @pytest.mark.parametrize("finger", FINGERTIPS)
     def test_fingertips_have_the_shape_of_the_sensor(self, finger):
         module = hand("allegro-uskin").modules[finger]

@@ -5,9 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
 from holdfast.sensors import Hand, HandModule, Sensor, built_in_sensors, hand, sensor
 
@@ -85,14 +82,6 @@ def test_arrays_are_read_only_and_its_own():
 
 def test_normal_has_length_one():
     assert two_taxels().normal.tolist() == [0, 0, 1]
-
-
-@given(st.integers(0, 2**32 - 1))
-def test_rounded_rotations_become_exact(seed):
-    turns = Rotation.random(2, rng=np.random.default_rng(seed)).as_matrix()
-    exact = two_taxels(rotations=turns.round(6)).rotations
-    np.testing.assert_allclose(exact @ exact.transpose(0, 2, 1), [np.eye(3)] * 2, atol=1e-12)
-    np.testing.assert_allclose(exact, turns, atol=2e-6)
 
 
 def test_equal_by_content():
@@ -184,12 +173,6 @@ class TestFromJson:
     def test_unit_and_range_may_be_left_out(self, tmp_path):
         one = Sensor.from_json(written(tmp_path, unit="absent", range="absent"))
         assert (one.unit, one.range) == ("count", None)
-
-    def test_infinity_in_disguise(self, tmp_path):
-        path = written(tmp_path)
-        path.write_text(path.read_text().replace("0.01", "1e999"))
-        with pytest.raises(ValueError, match="pair"):
-            Sensor.from_json(path)
 
 
 class TestHand:

@@ -125,20 +125,6 @@ def test_a_long_chain_is_walked_once(tmp_path):
     np.testing.assert_allclose(one.rotations[-1, 0, :2], [np.cos(angle), -np.sin(angle)], atol=1e-9)
 
 
-def test_links_in_a_circle_end(tmp_path):
-    path = tmp_path / "circle.urdf"
-    path.write_text(
-        "<robot>"
-        + "".join(
-            f'<joint name="{name}"><parent link="{parent}"/><child link="{child}"/></joint>'
-            for name, parent, child in [("taxel", "a", "b"), ("j", "b", "a"), ("taxel2", "c", "c")]
-        )
-        + "</robot>"
-    )
-    assert Sensor.from_urdf(path, "a").n_taxels == 1
-    assert Sensor.from_urdf(path, "c").n_taxels == 1
-
-
 def test_a_pipe_and_other_encodings_are_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(OSError, match="regular file"):

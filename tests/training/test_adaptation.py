@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from holdfast.detection import Linear
-from holdfast.training.adaptation import Adaptation, choose_adaptation, choose_nearest
+from holdfast.training.adaptation import choose_adaptation, choose_nearest
 from holdfast.training.classifiers import Samples
 from holdfast.training.classifiers.logreg import CALIBRATION, NONE, WEIGHTS
 from holdfast.training.finger_samples import FingerSamples
@@ -83,17 +83,3 @@ def test_one_class_in_a_fold_keeps_the_model():
 )
 def test_the_nearest_within_one_standard_error(losses, row):
     assert choose_nearest(np.array(losses)) == row
-
-
-@pytest.mark.parametrize(
-    ("change", "finger", "named"),
-    [
-        (NONE, "*", "kept mine: "),
-        (CALIBRATION, "*", "the calibration of mine (C = 0.001)"),
-        (WEIGHTS, "thumb", "the weights of mine for thumb (C = 0.001)"),
-    ],
-)
-def test_the_line_for_the_user_names_what_was_adapted(change, finger, named):
-    line = Adaptation({"change": change, "C": 1e-3}, 2, 0.4, 0.3).describe("mine", finger)
-    assert named in line
-    assert "2 recordings" in line

@@ -99,14 +99,6 @@ def test_one_recording_is_split_by_time(known, few):
     assert len(warnings) == 1 and "--split time" in warnings[0]
 
 
-def test_what_was_taken_is_reported_for_every_finger(known, few):
-    _, messages = train_with_warnings(few, Setting.adapting(known))
-    assert len(messages) == 2
-    for message, finger in zip(messages, ("thumb", "index"), strict=True):
-        assert f"mine for {finger}" in message
-        assert "2 recordings" in message
-
-
 def test_windows_are_meant_for_the_rate_of_the_model(known):
     fast = [tiny_recording(seed, n=1200, rate=300.0) for seed in (50, 51)]
     assert train(fast, Setting.adapting(known, trials=0)).model.rate == pytest.approx(100.0)
@@ -125,12 +117,6 @@ def test_another_sensor_is_used_with_a_warning(known):
     assert "thumb, index" in warning and "other (N)" in warning
     assert adapted.sensors == {"other": other}
     assert {part.sensor for part in adapted.fingers.values()} == {"other"}
-
-
-def test_a_model_for_any_sensor_needs_no_warning(known, few):
-    part = msgspec.structs.replace(known.fingers[ANY_FINGER], sensor=None)
-    init = msgspec.structs.replace(known, fingers={ANY_FINGER: part}, sensors={})
-    assert train_with_warnings(few, Setting.adapting(init, trials=0))[1] == []
 
 
 def test_parts_of_the_recordings_of_both_trainings_are_known(known, few):
@@ -157,21 +143,6 @@ def test_warn_of_recordings_that_the_model_was_trained_on(known, few):
 
 
 # --- what is refused -------------------------------------------------------------------------
-
-
-def test_a_shared_classifier_cannot_be_adapted_from_one_for_each_finger(known):
-    with pytest.raises(ModelError, match="thumb, index"):
-        Setting.adapting(by_finger(known), shared=True)
-
-
-def test_fingers_with_different_features(known):
-    own = by_finger(known)
-    other = parse_features("F_a,F_x,F_y,F_z,m,sigma", 10)
-    stable = msgspec.structs.replace(own.fingers["index"].stable, features=other)
-    part = own.fingers["index"].with_heads(stable)
-    unlike = msgspec.structs.replace(own, fingers=own.fingers | {"index": part})
-    with pytest.raises(ModelError, match="features"):
-        Setting.adapting(unlike)
 
 
 def test_a_finger_that_the_model_lacks(known):

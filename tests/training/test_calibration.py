@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import holdfast
-from holdfast.contact import STABLE, UNSTABLE, ContactState
-from holdfast.detection import Handling, Model, detect
+from holdfast.contact import STABLE, ContactState
+from holdfast.detection import Model, detect
 from holdfast.errors import ModelError, TrainingError
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.training import calibrate, calibrate_with_report
@@ -16,7 +16,6 @@ from holdfast.training.calibration import (
     CALIBRATED_SUFFIX,
     HandlingFigures,
     activity,
-    n_changed,
 )
 from holdfast.training.own_handling import (
     MIN_SCALE,
@@ -108,38 +107,6 @@ def test_labels_have_no_part_in_it(model, calibrated):
         labelled.append(Recording(recording.name, modules))
     handling, usual = handling_of(calibrate(model, labelled)), handling_of(calibrated.model)
     assert (handling.location, handling.thresholds) == (usual.location, usual.thresholds)
-
-
-def scaled(recording, factor):
-    modules = {
-        name: Tactile(PAD, module.times, factor * np.array(module.readings))
-        for name, module in recording.modules.items()
-    }
-    return Recording(recording.name, modules)
-
-
-@pytest.mark.parametrize("factor", [8.0, 0.25, 3.7])
-def test_the_unit_of_the_readings_changes_nothing(model, calibrated, factor):
-    other = handling_of(calibrate(model, [scaled(recording, factor) for recording in DATA]))
-    handling = handling_of(calibrated.model)
-    assert other.location == pytest.approx(handling.location, abs=1e-8)
-    assert other.scale == pytest.approx(handling.scale, rel=1e-8)
-    assert other.thresholds.keys() == {"stable", "slip"}
-    assert other.thresholds == pytest.approx(handling.thresholds, rel=1e-12)
-
-
-def test_a_tenth_of_slip_changes_little(model, calibrated):
-    mixed = [handling_recording(k, held=12.0, slip=0.1) for k in range(3)]
-    handling, clean = handling_of(calibrate(model, mixed)), handling_of(calibrated.model)
-    shift = np.abs(np.subtract(handling.location, clean.location)) / clean.scale
-    assert shift.max() < 0.35
-    assert np.max(np.divide(handling.scale, clean.scale)) < 1.5
-    own = calibrate(model, mixed)
-    assert stable_share(own, FRESH) > 0.9
-    sliding = handling_recording(8, held=12.0, slip=0.5)
-    for trace in detect(own, sliding).fingers.values():
-        shown = (trace.times > 2.0) & (trace.times < 7.0)
-        assert np.mean(trace.state[shown] == UNSTABLE) > 0.9
 
 
 def test_handling_of_several_sensors(model, calibrated):
@@ -239,20 +206,6 @@ def test_activity_is_in_default_scales(model):
     assert activity(part, rows) == pytest.approx(0.7)
 
 
-def test_features_that_changed_are_counted(model):
-    part = model.fingers["*"]
-    location, scale = part.default_handling
-    own = {"seconds": 9.0, "location": location.copy(), "scale": scale.copy()}
-    own["location"][0] += 0.6 * scale[0]
-    own["location"][1] -= 0.4 * scale[1]
-    own["scale"][2] *= 1.6
-    own["scale"][3] /= 1.6
-    own["scale"][4] *= 1.4
-    handling = Handling(**{**own, "location": tuple(own["location"]),
-                                          "scale": tuple(own["scale"])})  # fmt: skip
-    assert n_changed(part, handling) == 3
-
-
 def test_most_of_it_slip_is_refused(model):
     slips = [handling_recording(k, held=12.0, slip=0.8) for k in range(3)]
     with pytest.raises(TrainingError, match="pad"):
@@ -314,22 +267,6 @@ def test_still_handling_does_not_shrink_the_scales(model):
     assert summary.after.raised <= summary.before.raised
     with pytest.raises(TrainingError, match="pad"):
         report.check()
-
-
-@pytest.mark.parametrize(
-    ("change", "command"),
-    [
-        ({"threshold": 1.0}, "holdfast teach hand: -o taught.json"),
-        ({"at_most": 2.1}, "minutes more of handling"),
-        ({"at_most": 1.9}, "holdfast detect mine.json hand:"),
-    ],
-)
-def test_what_to_do_next(calibrated, change, command):
-    (slips,) = calibrated.sensors[0].slips
-    slips = msgspec.structs.replace(slips, **{"threshold": 0.5, **change})
-    summary = msgspec.structs.replace(calibrated.sensors[0], slips=(slips,))
-    report = dataclasses.replace(calibrated, sensors=(summary,))
-    assert command in report.next_step("mine.json", "hand:", 1.0)
 
 
 FIGURES = HandlingFigures(0.4, 95.0, 2.0, 0.1, 1.0)

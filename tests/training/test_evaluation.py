@@ -1,4 +1,3 @@
-import weakref
 from dataclasses import replace
 
 import msgspec
@@ -68,20 +67,6 @@ def test_without_labels_nothing_is_counted(model):
     bare = tiny_recording(32, states=[None] * 4)
     metrics = evaluate(model, [bare])
     assert (metrics.pooled.n, metrics.pooled.accuracy) == (0, None)
-
-
-def test_one_recording_at_a_time_is_in_memory(model):
-    alive = weakref.WeakSet()
-
-    def lazy():
-        for seed in range(5):
-            recording = tiny_recording(seed)
-            alive.add(recording)
-            assert len(alive) <= 2  # this one, and the last until the loop moves on
-            yield recording
-            del recording
-
-    assert evaluate(model, lazy()).pooled.n == 5 * 2 * (400 - 50 - 13)
 
 
 def test_a_model_for_other_fingers(model):

@@ -99,11 +99,6 @@ class TestTrain:
             assert both.sum() > 50
             assert np.abs(trace.slip_speed - true)[both].mean() < 3  # of 10 mm/s
 
-    def test_the_file_has_the_rule(self, trained, tmp_path):
-        model = trained[0].model
-        model.save(tmp_path / "model.json")
-        assert type(model).load(tmp_path / "model.json").fingers == model.fingers
-
     def test_labels_give_no_speed(self, recordings):
         labelled = [replace(made, truth=None) for made in recordings]
         part = train(labelled, SETTING).model.fingers["*"]

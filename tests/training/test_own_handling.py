@@ -17,7 +17,6 @@ from holdfast.training.own_handling import (
     HandlingKey,
     OwnHandling,
     check_shear,
-    grasped_durations,
     grasped_samples,
     location_and_scale,
 )
@@ -52,11 +51,6 @@ def test_what_begins_or_ends_in_contact_is_held_there():
     assert held_runs((UNKNOWN, 5), (STABLE, 45), (UNKNOWN, 50), (UNSTABLE, 60)) == [
         [5, 50], [100, 160]
     ]  # fmt: skip
-
-
-def test_a_gap_is_not_held():
-    times = np.concatenate([np.arange(100), 500 + np.arange(100)]) / 100
-    assert grasped_durations(times).sum() == pytest.approx(2.0, abs=0.01)
 
 
 def test_location_and_scale_of_normal_values():
@@ -128,12 +122,6 @@ def test_the_change_of_a_load_that_is_not_known_is_not_known():
     assert math.isnan(handling_of(in_counts).load_change(PAD_KEY))
 
 
-def test_clips_of_half_a_second_count():
-    clips = [handling_recording(k, held=0.2, open_for=0.15) for k in range(20)]
-    handling = handling_of(*clips)
-    assert handling.seconds(PAD_KEY) > 20 * 0.15
-
-
 def labelled(cause, *spans):
     """Handling that is held from 1.3 to 13.3 s by two fingers; one has labels of a cause."""
     labels = [Label(*span, "UNSTABLE", cause) for span in spans]
@@ -170,14 +158,6 @@ def test_sensors_are_kept_apart():
     thumb = handling_module(4)
     handling = handling_of(Recording("two", {"thumb": thumb, "index": other}))
     assert set(handling.samples) == {PAD_KEY, HandlingKey("*", "other")}
-
-
-def test_a_sensor_of_one_name_is_one_sensor():
-    with pytest.raises(TrainingError, match="4 taxels"):
-        handling_of(
-            handling_recording(0),
-            handling_recording(1, sensor=sensor(4, "pad", unit="N", limits=None)),
-        )
 
 
 def test_there_is_enough_at_some_time(monkeypatch):

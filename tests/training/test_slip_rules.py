@@ -28,7 +28,6 @@ from holdfast.training.thresholds import (
     SLIP_FALSE_ALARMS,
     choose_slip_threshold,
     tune,
-    with_slip_threshold,
 )
 
 from .build import sliding_recording, tiny_recording
@@ -86,12 +85,6 @@ class TestTraining:
         assert metrics.threshold_chosen
         low, high = metrics.intervals.false_alarms_per_minute["held"]
         assert low <= metrics.pooled.false_alarms_per_minute["held"] <= high
-
-    def test_the_record_is_in_the_file(self, model, tmp_path):
-        model.save(tmp_path / "model.json")
-        loaded = Model.load(tmp_path / "model.json")
-        assert loaded.fingers == model.fingers
-        assert loaded.training.sliding_samples == {"*": 6 * 2 * 4 * 10}  # the first 0.1 s
 
     def test_samples_left_out_have_no_decision_and_no_truth(self, model, others):
         judged = compute_decisions(model, others[0])
@@ -164,15 +157,6 @@ class TestNoRule:
         assert f"10 samples that slide and {3 * 1300 - 40}" in text
         assert f"at least {MIN_SLIDING_SAMPLES}" in text
 
-    def test_with_false_alarms_at_every_threshold(self, model):
-        n = 6000
-        times, still = np.arange(n) / 100, np.full(n, STILL, dtype=np.int8)
-        truth = SlipTruth(still, still == STILL, (), "truth")
-        sure = SlipDecisions(times, np.full(n, 1 - 1e-9), still == STILL, 0.0, truth)
-        chosen = choose_slip_threshold([{"thumb": slip_curve(sure)}] * 2, [0, 1], 0)
-        assert "at most 1 false alarms a minute in 2 min" in chosen.reason
-        assert rule_of(with_slip_threshold(model, chosen.point)) is None
-
     @pytest.mark.parametrize("code", [STILL, NOT_HELD])
     def test_with_too_little_held_time(self, code):
         times, codes = np.arange(3000) / 100, np.full(3000, code, dtype=np.int8)
@@ -184,12 +168,6 @@ class TestNoRule:
         assert chosen.reason.startswith(f"{minutes} min of held time given; ")
         assert "need at least 1 min" in chosen.reason
         assert not chosen.metrics.threshold_chosen
-
-    def test_an_adapted_model_keeps_its_rule(self, model):
-        few = [tiny_recording(seed) for seed in (50, 51)]
-        adapted = train(few, Setting.adapting(model, trials=0)).model
-        assert set(adapted.fingers) == {"thumb", "index"}
-        assert all(part.slip == rule_of(model) for part in adapted.fingers.values())
 
     def test_an_adapted_model_without_a_rule_gets_none(self, grasps, recordings):
         plain = train(grasps, SETTING).model
@@ -210,23 +188,6 @@ class TestTuning:
         assert metrics.raised_quiet <= MAX_RAISED_QUIET
         assert metrics == tuned.chosen.slips
         assert slips_of(model, others) == tuned.before.slips
-
-    def test_the_model_keeps_how_it_was_tuned(self, model, others):
-        named = msgspec.structs.replace(model, name="mine")
-        tuned = tune(named, others, 5.0, "slip")
-        rule = rule_of(tuned.model)
-        assert tuned.model.name == "mine, tuned"
-        assert rule.threshold == tuned.chosen.threshold
-        assert rule.choice.requested == 5.0
-        assert rule.choice.recordings == {made.name: made.readings_digest for made in others}
-        assert rule.choice.found == tuned.chosen.slips.incipient["0.1"]
-        (before,), (after,) = (m.fingers.values() for m in (model, tuned.model))
-        assert after.stable == before.stable
-
-    @pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
-    def test_a_rate_that_is_none(self, model, others, rate):
-        with pytest.raises(ValueError, match="false alarms"):
-            tune(model, others, rate, "slip")
 
     def test_a_model_without_a_rule(self, others):
         with pytest.raises(ModelError, match="slip rule"):

@@ -10,8 +10,6 @@ from holdfast.contact import Cause, ContactState
 from holdfast.detection import Model
 from holdfast.detection.specs import SLIDING_FEATURES
 from holdfast.errors import TrainingError
-from holdfast.io import load_dataset, save_recording
-from holdfast.parallel import Engine
 from holdfast.recordings import Label
 from holdfast.training import evaluate, teach_with_report, teaching
 from holdfast.training.teaching import taught_recording
@@ -79,13 +77,6 @@ class TestModel:
         assert own.stable == handling.for_sensor("tiny").stable
         assert not (own.normalised or own.handling)
         assert own.slip == teach(BASE, recordings, false_alarms=3.0).finger("thumb").slip
-
-    def test_processes_give_the_same_model(self, taught, recordings, tmp_path):
-        for recording in recordings:
-            save_recording(recording, tmp_path / f"{recording.name}.parquet")
-        stored = load_dataset(tmp_path)
-        other = teach_with_report(BASE, stored, false_alarms=3.0, engine=Engine(2))
-        assert other.model == taught.model
 
 
 def _handling(location, scale):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from detection.detector.build import finger_model, slip_head
-from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, ContactState
+from holdfast.contact import STABLE, ContactState
 from holdfast.detection import Debounce, Model, parse_features
 from holdfast.errors import ModelError, TrainingError
 from holdfast.metrics import Decisions, FingerDecisions, match_decisions, summarise
@@ -51,19 +51,6 @@ def test_it_gives_the_states_of_the_detector(model, debounce, threshold):
     assert match_decisions(found) == match_decisions(expected)
 
 
-def test_a_lower_threshold_is_stable_more_often(model):
-    replay = ThresholdReplay.of(model, tiny_recording(21))
-    stable = [(replay.hand(p).states == STABLE).sum() for p in (0.999, 0.5, 0.001)]
-    assert stable == sorted(stable)
-    assert stable[0] < stable[-1]
-
-
-def test_the_threshold_is_that_of_all_fingers(model):
-    changed = model.with_threshold("stable", 0.25)
-    assert {part.stable.threshold for part in changed.fingers.values()} == {0.25}
-    assert changed.with_threshold("stable", 0.5).fingers.keys() == model.fingers.keys()
-
-
 # --- tune ------------------------------------------------------------------------------------
 
 
@@ -84,15 +71,6 @@ def test_the_detector_keeps_to_the_rate(model, others, wanted):
     assert events.n_events == tuned.chosen.events.n_events > 0
     assert events.missed == tuned.chosen.events.missed
     assert tuned.chosen.false_alarms == events.false_alarms_per_minute
-
-
-def test_no_other_threshold_shown_misses_less_for_that_rate(model, others):
-    tuned = tune(model, others, 40.0)
-    allowed = [point for point in tuned.points if point.false_alarms <= 40.0]
-    assert min(allowed, key=lambda point: point.cost(40.0)) == tuned.chosen
-    thresholds = [point.threshold for point in tuned.points]
-    assert thresholds == sorted(thresholds)
-    assert tuned.chosen.threshold in thresholds
 
 
 def test_the_model_keeps_how_it_was_tuned(model, others, tmp_path):
@@ -261,15 +239,6 @@ def test_two_fingers_have_more_alarms_in_the_same_time():
     assert (parts.seconds, parts.alarms_per_minute(0.5)) == (pytest.approx(120.0), 1.0)
 
 
-def test_an_alarm_at_the_release_is_right():
-    states = np.repeat([STABLE, NO_CONTACT, STABLE, UNKNOWN], [1000, 500, 1000, 500])
-    probability = np.full(3000, 0.9)
-    probability[990:1000] = probability[1500:1510] = probability[2490:2500] = 0.01
-    assert held_finger(probability, states=states).n_alarms(0.5) == 0
-    probability[500:510] = 0.01
-    assert held_finger(probability, states=states).n_alarms(0.5) == 1
-
-
 # --- slips of own handling -------------------------------------------------------------------
 
 
@@ -313,15 +282,6 @@ def test_the_minutes_of_all_fingers_count():
     assert 0.7 < chosen.threshold <= 0.8  # two alarms in two minutes
 
 
-def test_the_interval_is_exact_and_shrinks_with_more_handling():
-    from scipy.stats import poisson
-
-    (chosen,) = slips_of(bumps(0.9, 0.8, 0.6), false_alarms=2.0)
-    assert poisson.cdf(chosen.n, chosen.at_most * chosen.minutes) == pytest.approx(0.05)
-    assert chosen.n / chosen.minutes < chosen.then_at_most < chosen.at_most
-    assert f"at most {chosen.at_most:.1f} a minute" in chosen.text()
-
-
 @pytest.mark.parametrize(
     ("scores", "silent"), [((-2.0,) * 10, True), ((-2.0,) * 8 + (4.0,) * 2, False)]
 )
@@ -336,13 +296,6 @@ def test_a_threshold_that_finds_hardly_a_slip_is_none(scores, silent):
     assert [x.probability for x in chosen.highest] == list(heights[:5])
     assert [x.time for x in chosen.highest] == pytest.approx([1.0, 6.0, 11.0, 16.0, 21.0], abs=0.05)
     assert ("thumb 1.00 s" in chosen.text()) is silent
-
-
-def test_handling_full_of_slips_leaves_the_head_silent():
-    slips = np.full(6000, 0.1)
-    slips[100::100] = 1.0
-    (chosen,) = slips_of(slips)
-    assert chosen.is_silent
 
 
 def test_each_form_of_zero_has_its_head():

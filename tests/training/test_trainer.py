@@ -12,7 +12,7 @@ from holdfast.metrics import summarise
 from holdfast.recordings import Recording
 from holdfast.training import Setting, compute_decisions, train, trainer
 from holdfast.training.classifiers import recipe
-from holdfast.training.classifiers.fitting import Fitted, Samples
+from holdfast.training.classifiers.fitting import Fitted
 from holdfast.training.dataset_scan import scan_dataset
 from holdfast.training.model_fit import fit_model
 from holdfast.training.splits import split_data
@@ -63,16 +63,16 @@ def test_no_choice_uses_the_units_that_are_evaluated(grasps, split, monkeypatch)
     """Parameters of a unit's model come from a choice without that unit."""
     chosen, evaluated = {}, {}
 
-    def spy_choose(samples, setting, finger):
+    def spy_choose(samples, folds, recipe, seed):
         token = float(len(chosen) + 1)
         chosen[token] = set(samples.groups.tolist())
-        return {"C": token, "class_weight": None}, ""
+        return {"C": token, "class_weight": None}
 
     def spy_fit(data, setting, parameters, held):
         evaluated[min(held)] = [given["C"] for given in parameters.values()]
         return fit_model(data, setting, parameters, held)
 
-    monkeypatch.setattr(trainer, "_choose", spy_choose)
+    monkeypatch.setattr(trainer, "choose_parameters", spy_choose)
     monkeypatch.setattr(trainer, "fit_model", spy_fit)
     train(grasps, replace(GRID, split=split))
     n_units = 6 if split == "recording" else 3
@@ -152,13 +152,6 @@ def test_the_same_seed_gives_the_same_model(grasps):
     assert train(given, GRID) == train(given, GRID)
 
 
-@pytest.mark.parametrize("split", ["recording", "random"])
-def test_parallel_training_gives_the_same_model(grasps, split):
-    setting, given = replace(GRID, split=split), grasps[:3]
-    alone = train(given, setting)
-    assert train(given, setting, n_jobs=2) == alone
-
-
 @pytest.mark.parametrize(
     ("asked", "found"),
     [
@@ -203,13 +196,6 @@ def test_fewer_than_two_usable_folds_give_the_reference_setting_and_a_warning():
     # Two recordings make two folds for the model itself, but one for each of the figures.
     assert len(warnings) == 1 and warnings[0].startswith("thumb: 0 of the folds")
     assert trained.cross_validation.pooled.n == 2 * 345
-    found, warning = trainer._choose(
-        Samples(np.zeros((4, 1)), np.array([0, 1, 0, 1], bool), np.zeros(4, int)),
-        GRID,
-        "thumb",
-    )
-    assert found == recipe("logreg").reference
-    assert warning == warnings[0]
 
 
 def test_a_finger_of_one_recording_is_trained_but_not_evaluated(grasps):
@@ -261,33 +247,3 @@ def test_refusals(given, split, message):
     setting = replace(SETTING, split=split)
     with pytest.raises(TrainingError, match=message):
         train(given, setting)
-
-
-def test_a_window_longer_than_the_data(grasps):
-    setting = replace(SETTING, window=1000, features=parse_features("sigma", 1000))
-    with pytest.raises(TrainingError, match="thumb"):
-        train(grasps, setting)
-
-
-def test_long_steps_report_progress(grasps):
-    steps = []
-
-    def progress(items, what, total):
-        steps.append((what, total))
-        return iter(items)
-
-    train(grasps, GRID, progress=progress)
-    assert steps == [
-        ("reading", 6),
-        ("features", 6),
-        ("choosing", 12),
-        ("fitting", 6),
-        ("evaluating", 6),
-    ]
-
-
-def test_warn_of_many_undecided_samples(grasps, monkeypatch):
-    warnings = []
-    monkeypatch.setattr("holdfast.training.trainer.MAX_UNDECIDED_FRACTION", 0.0)
-    train(grasps, Setting(trials=0), warn=warnings.append)
-    assert len(warnings) == 1 and "--tare first" in warnings[0]

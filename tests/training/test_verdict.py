@@ -23,49 +23,6 @@ def metrics(states, probability=RIGHT, labels=LABELS, n=1, **exact):
     return summarise([Decisions.of(f"{k}", {"thumb": finger}, 1) for k in range(n)])
 
 
-def with_false_alarms(every, first=50):
-    """Right decisions, and a false alarm every so many samples of stable label."""
-    indices = np.arange(len(LABELS))
-    wrong = (LABELS == STABLE) & (indices % every == first)
-    return np.where(wrong, UNSTABLE, LABELS)
-
-
-def late(n_events):
-    """Decisions that overlook the first events."""
-    return np.where(np.arange(len(LABELS)) < 1000 * n_events, STABLE, LABELS)
-
-
-CALM = np.where(np.arange(12_000) < 5000, UNSTABLE, STABLE)
-ALWAYS = np.full(12_000, STABLE)
-NEVER = np.full(12_000, UNSTABLE)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "start"),
-    [
-        ((np.full(12_000, UNKNOWN),), "weak: at most 1.9 false alarms a minute, 100 % missed"),
-        ((NEVER,), "weak: "),
-        (
-            (ALWAYS,),
-            "weak: at most 1.9 false alarms a minute, 100 % missed within 0.2 s; onsets: 12",
-        ),
-        ((with_false_alarms(100),), "weak: 60 false alarms a minute, 0 % missed"),
-        ((LABELS, RIGHT, LABELS, 7), "good: at most 0.27 false alarms a minute, 0 % missed"),
-        ((late(2), RIGHT, LABELS, 7), "usable: at most 0.27 false alarms a minute, 17 % missed"),
-        (
-            (late(5),),
-            "weak: at most 1.9 false alarms a minute, 42 % missed within 0.2 s; onsets: 12",
-        ),
-        (
-            (CALM, np.where(CALM == STABLE, 0.9, 0.1), CALM),
-            "not enough data (0 of 20 onsets, 1.1 of 10 held minutes, 1 of 5 recordings): at most",
-        ),
-    ],
-)
-def test_what_a_model_is_worth(arguments, start):
-    assert verdict(metrics(*arguments)).removeprefix("Stability: ").startswith(start)
-
-
 def test_tares_under_load_are_named():
     found = verdict(metrics(LABELS), LoadedTares(3, 5))
     assert found.endswith(" Tare taken under load in 3 of 5 recordings: see --tare.")
@@ -144,10 +101,6 @@ def with_slips(pooled, whole=None, found=None, rate=None):
     shares = dict.fromkeys(("before", "0.03", "0.05", "0.1"), found)
     limits = SlipIntervals(shares, {}, shares, found, None, None, {"quiet": None, "held": rate})
     return msgspec.structs.replace(whole, slips=SlipSummary({}, pooled, limits))
-
-
-def slip_sentence(*arguments, **intervals):
-    return verdict(with_slips(*arguments, **intervals)).partition(" Slips: ")[2]
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from holdfast.sensors.types import Array
-from holdfast.twin.objects import GraspObject, load_objects, object_named
+from holdfast.twin.objects import load_objects, object_named
 from holdfast.twin.skin import Skin
 from holdfast.twin.steps import probe, touch
 from holdfast.twin.surface import Surface, curved_fingertip
@@ -157,18 +157,6 @@ def test_the_world_may_be_turned_shifted_and_moved(seed: int, name: str) -> None
     shaken(here, seed, 15, check)
 
 
-def test_a_fingertip_that_leaves_has_no_state() -> None:
-    grip = Grip(BOX)
-    grip.settle(0.2)
-    assert grip.state.bristles.any()
-    grip.bodies[0, 0] += 0.001  # off the face by a little: node by node
-    grip.bodies[1, 0] -= 0.2  # far away: at once
-    grip.bodies[0, 0] += 0.002
-    touch(grip.state, grip.constants, grip.bodies, grip.dt)
-    for part in grip.state:
-        assert not part.any()
-
-
 @pytest.mark.parametrize("name", [*NAMES, "coupled can"])
 def test_held_at_rest_without_creep(name: str) -> None:
     if name == "coupled can":
@@ -184,19 +172,6 @@ def test_held_at_rest_without_creep(name: str) -> None:
     assert np.linalg.norm(grip.object_body[:3] - before) / (2000 * grip.dt) < 1e-6
     weight = [0.0, 0.0, GRAVITY * grip.mass]
     np.testing.assert_allclose(grip.state.wrench[:3], weight, atol=1e-3)
-
-
-def test_a_push_within_friction_springs_back() -> None:
-    grip = Grip(SMOOTH, depth=2e-3)
-    grip.settle(1.0)
-    rest, weight = grip.object_body[2], grip.mass * GRAVITY
-    push = 0.3 * SMOOTH.mu_kinetic * grip.state.load.sum() - weight
-    for force in (push, 0.0):
-        for _ in range(1500):
-            grip.step((0.0, 0.0, -force), spin=False)
-        moved = rest - grip.object_body[2]
-        assert (moved > 1e-4) == (force > 0)
-    assert abs(moved) < 2e-5
 
 
 @pytest.mark.parametrize("rate", [1.0, 5.0, 20.0])
@@ -227,42 +202,3 @@ def test_a_fingertip_slips_from_its_edge_and_lets_go_between_the_frictions(name:
     total = (pull + grip.mass * GRAVITY) / grip.state.load.sum()
     assert object_named(name).mu_kinetic < total < 1.15 * object_named(name).mu_static
     assert 0.05 < shares[len(shares) * 4 // 5] < 0.95
-
-
-@pytest.mark.parametrize(("kinetic", "sticks"), [(BOX.mu_kinetic, True), (BOX.mu_static, False)])
-def test_a_slow_pull_sticks_and_slips_where_friction_drops(kinetic: float, sticks: bool) -> None:
-    grip = Grip(replace(SMOOTH, mu_kinetic=kinetic))
-    grip.settle(0.3)
-    rest, start, slip = grip.object_body[2], grip.time, []
-    for _ in range(2000):
-        pull = 800.0 * (0.01 * (grip.time - start) - (grip.object_body[2] - rest))
-        grip.step((0.0, 0.0, pull), spin=False)
-        slip.append(grip.state.slip_speed[0])
-    late = np.array(slip[1300:])
-    assert (late.min() < 1e-4) == sticks
-    assert (late.max() > 0.05) == sticks
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_half_the_step_gives_the_same(name: str) -> None:
-    """A push of which the edge slips, and rest: forces, way and slid distance within 2 %."""
-    runs = [_pushed(object_named(name), dt) for dt in (1e-3, 0.5e-3)]
-    for one, other in zip(*runs, strict=True):
-        assert np.abs(one - other).max() < 0.02 * np.abs(other).max()
-
-
-def _pushed(item: GraspObject, dt: float) -> tuple[Array, Array, Array]:
-    grip, forces, way, slid = Grip(item, 2.2e-3, dt), [], [], 0.0
-    for _ in range(round(0.4 / dt)):
-        grip.step(spin=False)
-    limit, weight = item.mu_static * grip.state.load.sum(), item.mass * GRAVITY
-    push = 0.6 * np.sqrt(limit**2 - weight**2)
-    for k in range(round(0.4 / dt)):
-        time = (k + 0.5) * dt
-        force = push * np.sin(np.pi * time / 0.15) if time < 0.15 else 0.0
-        grip.step((0.0, force, 0.0), spin=False)
-        slid += float(grip.state.slip_speed[0]) * dt
-        if (k + 1) % round(0.01 / dt) == 0:
-            forces.append(grip.state.contact_force.ravel())
-            way.append(grip.object_body[:3].copy())
-    return np.array(forces), np.array(way), np.array([slid])

@@ -8,7 +8,6 @@ from holdfast.twin.control import (
     PROPORTIONAL,
     draw_controller,
 )
-from holdfast.twin.hand import JOINTS
 from holdfast.twin.steps import DERIVATIVE, ENCODER_STEP, TORQUE_LIMIT, TORQUE_STEP, control
 
 PERIOD = 1 / 350
@@ -85,13 +84,6 @@ class TestGlitches:
         assert np.median(lengths) < GLITCH_TICKS[1]
         sizes = errors[edges[::2]]
         assert sizes[sizes != 0].std() == pytest.approx(GLITCH_ERROR, rel=0.1)
-
-    def test_strike_one_finger(self):
-        errors = draw(0, 300.0).errors
-        for row in errors[errors.any(axis=1)]:
-            by_finger = row.reshape(4, 4).any(axis=1)
-            assert by_finger.sum() == 1
-        assert set(JOINTS.values()) == {0, 4, 8, 12}
 
     def test_move_the_set_point(self, plain):
         errors = plain.errors.copy()

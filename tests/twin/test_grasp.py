@@ -65,15 +65,6 @@ def test_targets_go_along_the_path(can):
     )
 
 
-def test_fingers_move_each_on_its_own(can):
-    depths = np.zeros(4)
-    before = can.targets(depths)
-    depths[FINGERS.index("middle")] = -0.01
-    moved = np.flatnonzero(can.targets(depths) != before)
-    assert set(moved) <= set(range(4, 8))
-    assert len(moved)
-
-
 def test_beyond_its_ends_the_path_stands_still(can):
     np.testing.assert_array_equal(can.targets(np.full(4, 0.2)), can.targets(np.full(4, 0.035)))
     np.testing.assert_array_equal(can.targets(np.full(4, -0.2)), can.targets(np.full(4, -0.025)))

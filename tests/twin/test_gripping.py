@@ -43,14 +43,6 @@ class TestPressing:
         assert not moved[JOINTS["middle"] : JOINTS["middle"] + 4].any()
         assert moved[JOINTS["index"] : JOINTS["index"] + 4].any()
 
-    def test_a_sag_across_the_path_is_no_pressing(self, can_path):
-        """The first joint of a finger carries the weight; it is not what presses."""
-        joints = can_path.targets(DEPTHS)
-        joints[JOINTS["index"]] -= 0.02
-        joints[JOINTS["index"] + 1] -= 0.02
-        moved = Pressing(can_path, DEPTHS, joints).displacement(np.full(4, 2.0))
-        assert abs(moved[JOINTS["index"]]) < 0.2 * abs(moved[JOINTS["index"] + 1])
-
 
 def test_a_fixed_command_changes_no_byte():
     """Steps with a scale of 1, read one by one, are the recording of a grasp."""

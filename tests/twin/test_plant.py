@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from holdfast.twin.control import GLITCH_ERROR, draw_controller
-from holdfast.twin.hand import FRICTION, N_JOINTS, RATE, HandModel
-from holdfast.twin.objects import object_named
+from holdfast.twin.hand import N_JOINTS, RATE
 from holdfast.twin.plant import PLANTS
 from holdfast.twin.simulation import Grasp, Simulation
 from holdfast.twin.steps import control
@@ -76,14 +75,6 @@ def test_the_published_angles_follow_as_the_filter_of_the_driver():
 
 
 STEP = 333.3 / 65536 * np.pi / 180
-
-
-def test_joints_have_the_friction_of_the_plant():
-    item = object_named("can")
-    for friction in (FRICTION, HARD.joint_friction):
-        model = HandModel.build(item, friction).model
-        np.testing.assert_array_equal(model.dof_frictionloss[:N_JOINTS], friction)
-        assert not model.dof_frictionloss[N_JOINTS:].any()
 
 
 class TestMotor:

@@ -5,7 +5,7 @@ from holdfast.contact import Phase
 from holdfast.metrics.slip_truth import slip_truth
 from holdfast.twin import scripted
 from holdfast.twin.scripted import perform
-from holdfast.twin.simulation import Grasp, Simulation
+from holdfast.twin.simulation import Grasp
 
 CAN = Grasp("can", 2, 1, seed=5)
 
@@ -50,20 +50,3 @@ def test_an_arm_that_carries_changes_the_force():
         force = recording.truth.fingers["index"]["contact_force"][start : start + 400]
         spread.append(np.ptp(force, axis=0).max())
     assert spread[1] > 2 * spread[0]
-
-
-def test_knocks_and_pushes_take_turns(monkeypatch):
-    plans = []
-
-    class Watched(Simulation):
-        def __init__(self, grasp, *, plan, loads=()):
-            plans.append(plan)
-            super().__init__(grasp, plan=plan, loads=loads)
-
-    monkeypatch.setattr(scripted, "Simulation", Watched)
-    recording = perform(CAN, "touch", 3, 10.0)
-    assert recording.metadata["case"] == "1"
-    starts = [impact.start for impact in plans[-1].impacts]
-    starts = (starts, [push.start for push in plans[-1].disturbances])
-    parts = [[int((x - scripted.FIRST_ACTION) / 2.0) for x in own] for own in starts]
-    assert parts == [[0, 2], [1]]

@@ -177,32 +177,6 @@ class TestSeeds:
     def test_the_same_seed_gives_the_same_samples(self, held):
         assert made(Grasp("can", 1, 1)).digest == held.digest
 
-    @pytest.mark.parametrize("change", [{"seed": 1}, {"attempt": 1}, {"server": True}])
-    def test_another_gives_others(self, held, change):
-        other = made(replace(Grasp("can", 1, 1), **change))
-        assert other.digest != held.digest
-        same = np.array_equal(other.truth.hand["joints"], held.truth.hand["joints"])
-        assert same == ("server" in change)  # a server sends the same grasp otherwise
-        thumb = other.modules["thumb"]
-        assert (thumb.n_repeats > 0) == ("server" in change)
-        assert (np.ptp(np.diff(thumb.times)) > 1e-6) == ("server" in change)
-
-
-class TestLongHold:
-    def test_a_trembling_arm_shakes_what_is_held_and_is_no_touch(self):
-        chosen = msgspec.structs.replace(profile("long-hold"), idle=(0.7, 0.8), hold=6.0)
-        calm, shaken = (
-            made(Grasp("can", 1, 1), msgspec.structs.replace(chosen, arm_tremor=rms))
-            for rms in (0.0, 0.1)
-        )
-        still = quiet(shaken)
-        assert not shaken.truth.hand["outside_force"][still].any()
-        spreads = [on_object(recording, still)[:, 2].std() for recording in (calm, shaken)]
-        assert spreads[0] < 0.005
-        assert spreads[1] == pytest.approx(0.1 * shaken.metadata["object_mass"], rel=0.35)
-        for module in shaken.modules.values():
-            assert (module.label_states[still] == ContactState.STABLE.code).all()
-
 
 class TestMovedByAHand:
     def test_the_object_goes_both_ways(self, moved):

@@ -12,11 +12,7 @@ from holdfast.twin.profile import profile
 from holdfast.twin.protocol import THUMB_SHARE, Plan
 from holdfast.twin.simulation import Grasp, Simulation
 from holdfast.twin.slip_events import (
-    DISPLACED,
-    GRASP_LINE,
     RATE_FIELDS,
-    RECLOSING_TIME,
-    UPRIGHT,
     SlipEvent,
     SlipEvents,
     SlipKind,
@@ -117,12 +113,6 @@ class TestRunner:
         assert runner.records[0]["end"] == pytest.approx(ended + 0.1, abs=3 * PERIOD)
         assert runner.records[0]["slid"] > 0.001
 
-    @pytest.mark.parametrize("kind", list(SlipKind))
-    def test_only_an_operator_touches(self, kind):
-        _, states = run([event(kind)])
-        assert at(states, 1.5).touching == (kind not in ALONE)
-        assert not at(states, 0.5).touching
-
     def test_a_hand_pulls_until_it_slides_and_then_goes_steadily(self):
         slip = lambda time: 0.002 if time >= 1.6 else 0.0  # noqa: E731
         _, states = run([event("creep", distance=0.004)], slip)
@@ -134,21 +124,6 @@ class TestRunner:
         lasting = at(states, 2.0).load.guide[2] - at(states, 1.8).load.guide[2]
         assert lasting == pytest.approx(-0.2 * RATE["creep"], rel=0.05)
         assert min(speeds) < 0 == max(speeds)
-
-    @pytest.mark.parametrize("kind", ["creep", "turn"])
-    def test_a_hand_goes_back_to_the_pose_at_the_lock(self, kind):
-        for sign in (1.0, -1.0):
-            pose = body(2 * sign * DISPLACED * UPRIGHT, 0.1 * sign * GRASP_LINE)
-            _, states = run([event(kind)], pose=pose)
-            guide = at(states, 1.5).load.guide
-            assert np.sign(guide[12:15] @ UPRIGHT + guide[15:18] @ GRASP_LINE) == -sign
-
-    def test_rolling_goes_there_and_back(self):
-        _, states = run([event("roll", duration=RECLOSING_TIME + 2 * 0.25 / 0.3, distance=1.0)])
-        turns = [Rotation.from_matrix(state.load.guide[3:12].reshape(3, 3)).as_rotvec()[2]
-                 for state in states.values() if state.touching]  # fmt: skip
-        assert max(turns) == pytest.approx(0.25, abs=0.01)
-        assert abs(turns[-1]) < 0.01
 
 
 class TestGuide:
@@ -216,14 +191,6 @@ class TestSimulated:
         )
         np.testing.assert_allclose(total, [0, 0, 0.24 * GRAVITY], atol=0.02 * 0.24 * GRAVITY)
 
-    @pytest.mark.parametrize("kind", ALONE)
-    def test_nothing_outside_acts_in_what_changes_by_itself(self, recordings, kind):
-        recording = recordings[kind]
-        alone = (since_lock(recording) > 0.5) & (since_lock(recording) < 6.7)
-        assert not recording.truth.hand["outside_force"][alone].any()
-        assert not recording.truth.hand["outside_torque"][alone].any()
-        assert set(recording.truth.hand["phase"][alone]) == {"locked"}
-
     @pytest.mark.parametrize("kind", [k for k in SlipKind if k not in ALONE])
     def test_an_operator_who_touches_disturbs(self, recordings, kind):
         recording = recordings[kind]
@@ -234,13 +201,3 @@ class TestSimulated:
         assert touched[inside].mean() > 0.6
         assert not touched[~inside].any()
         assert (phase[inside] == "slipping").any()
-
-    def test_the_fingers_carry_what_is_poured_in(self):
-        """Until it slides, the contact forces hold the object and what was added."""
-        recording = held("weight", name="ball", duration=1.5, distance=1.0)
-        poured = (since_lock(recording) > 1.5) & (since_lock(recording) < 2.4)
-        added = recording.truth.hand["added_mass"][poured]
-        assert added.max() == pytest.approx(0.2 * 1.4, rel=0.02)
-        upwards = sum(f["contact_force"][poured, 2] for f in recording.truth.fingers.values())
-        expected = (object_named("ball").mass + added) * GRAVITY
-        np.testing.assert_allclose(upwards, expected, rtol=0.03)

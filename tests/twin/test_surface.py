@@ -54,16 +54,3 @@ def test_elements_are_even_and_cover_walls_crown_and_tip() -> None:
     assert high[1] == pytest.approx(0.0143, abs=2e-4)
     assert low[2] < TAXELS.positions[:, 2].min()
     assert TAXELS.positions[:, 2].max() < high[2] < 0.037
-
-
-@pytest.mark.parametrize("pitch", [0.00165, 0.0022, 0.0045])
-def test_area_and_its_moments_do_not_depend_on_the_elements(pitch: float) -> None:
-    other = curved_fingertip(pitch)
-    assert len(other.nodes) != len(SKIN.nodes)
-    assert other.areas.sum() == pytest.approx(SKIN.areas.sum(), rel=0.005)
-    np.testing.assert_allclose(
-        other.areas @ other.normals, SKIN.areas @ SKIN.normals, atol=0.005 * SKIN.areas.sum()
-    )
-    np.testing.assert_allclose(
-        other.areas @ other.nodes, SKIN.areas @ SKIN.nodes, atol=SKIN.areas.sum() * 3e-4
-    )

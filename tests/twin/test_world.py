@@ -50,15 +50,6 @@ def test_begins_as_the_object_is_put_there():
     assert made.slip == 0.0
 
 
-def test_the_operator_holds_the_object_before_an_open_hand():
-    made = world()
-    before = made.bodies[-1, :3].copy()
-    run(made, 1.0)
-    assert np.linalg.norm(made.bodies[-1, :3] - before) < 0.002
-    assert made.outside[2] == pytest.approx(GRAVITY * 0.24, rel=0.3)
-    assert not made.loads.any()
-
-
 def test_a_fallen_object_stays_below_the_picture():
     made = run(world(), 1.0, hold=0.0)
     low = made.bodies[-1, 2]

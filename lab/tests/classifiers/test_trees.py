@@ -40,13 +40,6 @@ def test_nan_features_have_no_probability():
     assert trees.probability(np.empty((0, 2))).shape == (0,)
 
 
-@pytest.mark.slow
-def test_they_are_deterministic():
-    given = square()
-    one, two = (fitted(given, 3).probability(given.features) for _ in range(2))
-    assert np.array_equal(one, two)
-
-
 @pytest.mark.parametrize("share", [0.1, 1.0])
 def test_balance_moves_the_threshold_and_not_the_probability(share):
     """Where the classes cannot be separated, the probability is the base rate throughout."""

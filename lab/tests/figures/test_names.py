@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from figures.test_experiment import series
+from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import summarise
 from holdfast.plots.evaluation import draw_evaluation
 from holdfast.plots.recording import plot_recording
 from holdfast.plots.sensors import plot_hand, plot_sensor
+from holdfast.plots.time_series import FingerSeries
 from holdfast.sensors import Hand, hand, sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.figures.curves import draw_reliability
@@ -27,6 +28,21 @@ NAME = r"$\bad{$"
 """As a formula, it is an error."""
 ESTIMATES = {NAME: IntervalEstimate(1.0, 0.5, 1.5), "other": IntervalEstimate(2.0)}
 COURSE = TrialCourse([0.0, 1.0, 2.0], [1.0] * 3, [1.0] * 3, [0.0] * 3)
+
+
+def series(n=200, seed=0, **options):
+    rng = np.random.default_rng(seed)
+    force = rng.normal(0, 100, (n, 3))
+    quarter = n // 4
+    phases = np.repeat(["free", "closing", "locked", ""], quarter)
+    labels = np.repeat([NO_CONTACT, UNSTABLE, STABLE, UNKNOWN], quarter)
+    sigma = np.abs(rng.normal(2, 0.1, n))
+    sigma[:5] = np.nan
+    amplitude = np.linalg.norm(force, axis=1)
+    made = FingerSeries(
+        "ball-1, index", 0.01 * np.arange(n), force, amplitude, amplitude / 2, sigma, labels, phases
+    )
+    return made._replace(**options)
 
 
 def recording():

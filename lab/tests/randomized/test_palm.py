@@ -59,29 +59,6 @@ def test_a_turned_palm_feels_gravity_from_elsewhere(seed):
     assert np.linalg.norm(before - after) > 0.1
 
 
-def test_an_arm_vibrates_by_its_rms():
-    _, shaken = motion(vibration=0.2)
-    rest = shaken.gravity - shaken.gravity.mean(axis=0)
-    assert np.sqrt((rest**2).mean()) == pytest.approx(0.2, rel=0.35)
-
-
-def test_an_arm_that_moves_vibrates_more():
-    generator = np.random.default_rng(0)
-    segment = draw_segment(generator, ARM, "carry", 1.0)
-    resting = segment._replace(size=0.0)
-    shaken = [
-        palm_motion(np.random.default_rng(1), [resting], np.eye(3), 0.1, 4.0, factor)
-        for factor in (1.0, 5.0)
-    ]
-    calm, moving = (np.add(motion.gravity, [0.0, 0.0, GRAVITY]) for motion in shaken)
-    times = np.arange(len(calm)) / GRID_RATE
-    end = segment.start + segment.duration
-    inside = (times > segment.start + 0.1) & (times < end - 0.1)
-    outside = (times < segment.start) | (times > end)
-    np.testing.assert_allclose(moving[inside], 5.0 * calm[inside], atol=1e-9)
-    np.testing.assert_array_equal(moving[outside], calm[outside])
-
-
 RANGES = measured_ranges()
 LEVEL = np.eye(3)
 

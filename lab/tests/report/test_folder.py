@@ -52,14 +52,6 @@ def test_files_of_the_folder(tmp_path):
     assert "![curve](figures/curve.png)\n\nA \\<curve\\>.\n" in (out / "report.md").read_text()
 
 
-def test_stored_results_of_a_stopped_study_stay(tmp_path):
-    (tmp_path / "out/work").mkdir(parents=True)
-    (tmp_path / "out/work/a.msgpack").write_bytes(b"x")
-    check_output_folder(tmp_path / "out", STUDY)
-    write(tmp_path / "out")
-    assert (tmp_path / "out/work/a.msgpack").read_bytes() == b"x"
-
-
 def test_a_study_is_only_replaced_by_force(tmp_path):
     out = tmp_path / "out"
     write(out)

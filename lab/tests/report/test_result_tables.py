@@ -38,13 +38,6 @@ def test_lines_and_columns_are_in_the_order_of_first_appearance():
     assert [[cell.ours for cell in line.cells] for line in grid.lines] == [[1, 3], [4, 2]]
 
 
-def test_lines_with_the_same_first_head_are_adjacent():
-    rows = [Row({"on": on, "method": m, "figure": "x"}, 1.0) for m in "ab" for on in ("p", "q")]
-    grid = pivot(ResultTable("some", "", "", rows, ("on", "method")))
-    heads = [("p", "a"), ("p", "b"), ("q", "a"), ("q", "b")]
-    assert [line.heads for line in grid.lines] == heads
-
-
 def test_a_cell_without_a_row_is_none():
     grid = pivot(table(row(1), row(2, figure="FDR", classifier="SVM")))
     assert grid.lines[0].cells[1] is None and grid.lines[1].cells[0] is None
@@ -87,15 +80,6 @@ def test_csv_holds_every_value_to_the_last_digit(given_rows):
         for name, _, ours, paper, *_ in lines
     ]
     assert read == given_rows
-
-
-def test_csv_by_hand():
-    made = table(row(94.25, 95.3, n=60, interval=(92.0, math.inf)), row(math.nan, figure='"x", y'))
-    assert to_csv(made) == (
-        "classifier,figure,ours,paper,difference,n,low,high\n"
-        "LogReg,Acc,94.25,95.3,-1.05,60,92.0,inf\n"
-        'LogReg,"""x"", y",,,,,,\n'
-    )
 
 
 def test_json_is_strict_and_marks_infinite_values():

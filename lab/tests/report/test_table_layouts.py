@@ -1,7 +1,7 @@
 import math
 
 from holdfast_lab.report.result_tables import ResultTable, Row
-from holdfast_lab.report.table_layouts import notes, to_markdown
+from holdfast_lab.report.table_layouts import to_markdown
 
 
 def row(classifier, on, figure, *values):
@@ -35,13 +35,6 @@ def test_markdown_by_hand():
     )
 
 
-def test_columns_have_a_common_head():
-    rows = [Row({"figure": "Acc", "N_w": n}, 95.0) for n in (4, 6)]
-    made = ResultTable("window", "By window", "", rows, ("figure",), column="N_w")
-    assert "| figure | N\\_w 4 | N\\_w 6 |" in to_markdown(made)
-    assert notes(made) == []
-
-
 def test_the_number_of_recordings_has_a_column_if_it_varies():
     rows = [
         Row({"m": "a", "figure": "x"}, 1.0, n=60),
@@ -51,16 +44,3 @@ def test_the_number_of_recordings_has_a_column_if_it_varies():
     ]
     made = ResultTable("t", "T", "", rows, ("m",))
     assert "| b | 1.0 | 1.0 | 12–48 |" in to_markdown(made).splitlines()
-
-
-def test_an_interval_with_one_end():
-    rows = [Row({"m": "a", "figure": "x"}, 1.0, interval=(0.5, None)),
-            Row({"m": "a", "figure": "y"}, 1.0, interval=(None, 2.0))]  # fmt: skip
-    text = to_markdown(ResultTable("t", "T", "", rows, ("m",)))
-    assert "<sub>from 0.5</sub>" in text and "<sub>to 2.0</sub>" in text
-
-
-def test_a_value_of_the_paper_alone_has_no_difference():
-    rows = [Row({"where": "Table II", "figure": "printed"}, None, 95.3)]
-    alone = ResultTable("said", "What is said", "", rows, ("where",))
-    assert "| Table II | *paper 95.3* |" in to_markdown(alone)

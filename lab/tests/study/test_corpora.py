@@ -2,7 +2,6 @@ from dataclasses import replace
 
 import pytest
 
-from holdfast import simulated_grasps
 from holdfast.cli.terminal.console import print_message
 from holdfast.cli.terminal.progress import progress
 from holdfast.synthetic import synthetic_recording
@@ -39,30 +38,9 @@ def test_recordings_of_the_twin_are_not_the_real_ones(data, tmp_path):
     assert left_out[0].startswith("real recordings")
 
 
-def test_real_recordings_that_cannot_be_used_are_left_out(capsys, monkeypatch, tmp_path):
-    (tmp_path / "here" / corpora.REAL_DATA).mkdir(parents=True)
-    monkeypatch.setenv("HOLDFAST_DATA", str(tmp_path / "here"))
-    corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)
-    assert corpus is None
-    assert left_out[0].startswith("real recordings")
-    assert "real recordings" in capsys.readouterr().err
-
-
 def test_real_recordings_are_imported(data_folder, monkeypatch, tmp_path):
     monkeypatch.setenv("HOLDFAST_DATA", str(data_folder))
     corpus, left_out = corpora.real_corpus(tmp_path / "real", print_message)
     assert (len(corpus.recordings), corpus.tare, left_out) == (5, "first", [])
     again, _ = corpora.real_corpus(tmp_path / "real", print_message)
     assert again == corpus
-
-
-def test_the_rate_of_glitches_reaches_the_grasps(monkeypatch, tmp_path):
-    given = []
-    monkeypatch.setattr(
-        simulated_grasps, "simulate_grasps", lambda grasps, *_, **__: given.extend(grasps)
-    )
-    corpora.simulate_corpus(
-        tmp_path / "one", corpora.TWIN_CORPORA["glitch-1"], 5, 1, 1, print_message, progress
-    )
-    assert {grasp.glitch_rate for grasp in given} == {1 / 60}
-    assert {grasp.seed for grasp in given} == {7}

@@ -3,10 +3,10 @@
 import pytest
 
 from holdfast_lab.study.evaluation.recording_features import prepared_recordings
-from holdfast_lab.study.kept import KeptValues, recording_bytes, usable_memory
+from holdfast_lab.study.kept import KeptValues
 from holdfast_lab.study.plan import scan_corpus
 
-from .example_recordings import recording_with_truth, save_synthetic
+from .example_recordings import save_synthetic
 
 
 def one_byte(_):
@@ -25,33 +25,6 @@ def test_what_does_not_fit_is_made_again_and_what_fits_stays():
     for key in "abcabc":
         kept.get(key, lambda key=key: made.append(key), one_byte)
     assert made == ["a", "b", "c", "c"]
-
-
-def test_a_value_that_cannot_be_made_is_not_kept():
-    kept = KeptValues(10)
-    with pytest.raises(ZeroDivisionError):
-        kept.get("a", lambda: 1 / 0, one_byte)
-    assert kept.get("a", lambda: 7, one_byte) == 7
-
-
-def test_the_bytes_of_a_recording_are_those_of_its_arrays():
-    recording = recording_with_truth("made", seed=0)
-    without = sum(m.readings.nbytes + m.times.nbytes for m in recording.modules.values())
-    truth = recording.truth
-    arrays = [
-        truth.times,
-        *truth.hand.values(),
-        *(a for f in truth.fingers.values() for a in f.values()),
-    ]
-    assert recording_bytes(recording) == without + sum(array.nbytes for array in arrays)
-
-
-@pytest.mark.parametrize("text", ["max\n", "", str(1 << 60), "1048576\n"])
-def test_a_container_may_use_less_than_the_memory_of_the_machine(tmp_path, text):
-    limit = tmp_path / "memory.max"
-    limit.write_text(text)
-    expected = 1048576 if text == "1048576\n" else usable_memory(tmp_path / "none")
-    assert usable_memory(limit) == expected
 
 
 @pytest.fixture

@@ -24,25 +24,6 @@ def folder(tmp_path_factory):
     return save_synthetic(tmp_path_factory.mktemp("corpus") / "main", range(3))
 
 
-def test_a_corpus_describes_a_folder(folder):
-    corpus = scan_corpus("main", folder, tare="0.4")
-    assert corpus.name == "main"
-    assert corpus.recordings == ("grasp-0", "grasp-1", "grasp-2")
-    assert corpus.fingers == ("thumb", "index")
-    assert corpus.rate == pytest.approx(150.0)
-    assert corpus.tare == "0.4"
-
-
-def test_a_corpus_loads_only_its_recordings(folder, tmp_path):
-    corpus = scan_corpus("main", folder)
-    save_synthetic(folder, [7])
-    try:
-        assert corpus.load().names == corpus.recordings
-        assert corpus.load()[0].name == "grasp-0"
-    finally:
-        (folder / "grasp-7.parquet").unlink()
-
-
 def test_the_digest_depends_on_everything_that_a_study_uses():
     one = synthetic_recording("one", 0, ["index"])
     index = one.modules["index"]
@@ -55,15 +36,6 @@ def test_the_digest_depends_on_everything_that_a_study_uses():
     digests = {content_digest(each) for each in (one, *others)}
     assert len(digests) == 5
     assert content_digest(synthetic_recording("one", 0, ["index"])) == content_digest(one)
-
-
-def test_a_finger_of_one_class_is_left_out(tmp_path):
-    recordings = []
-    for seed in range(2):
-        one = synthetic_recording(f"grasp-{seed}", seed, ["thumb", "index"])
-        lost = relabelled(one, ContactState.NO_CONTACT).modules["thumb"]
-        recordings.append(replace(one, modules={**one.modules, "thumb": lost}))
-    assert scan_corpus("main", save_all(tmp_path / "data", recordings)).fingers == ("index",)
 
 
 @pytest.mark.parametrize(

@@ -1,16 +1,12 @@
 import json
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from holdfast.contact import ContactState
 from holdfast.errors import OutputError
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study import run
-from holdfast_lab.study.comparison import all_methods, jobs, sample_tables
-from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.paper import paper_tables
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from holdfast_lab.study.run import run_study
@@ -93,39 +89,6 @@ def test_stored_results_are_not_computed_again(done, plan, tmp_path):
     assert {path.name: path.read_bytes() for path in (out / "work").glob("*.msgpack")} == kept
     assert (out / "data").is_dir()
     assert summary(out)["tables"] == summary(done[0])["tables"]
-
-
-class TestOneFinger:
-    def test_a_study_of_short_stable_stretches_has_every_table(self, tmp_path, monkeypatch):
-        """Nothing is stable for the half second that an event needs: no events, no failure."""
-        recordings = (_short(synthetic_recording(f"g-{k}", k, ("thumb",))) for k in range(4))
-        corpus = scan_corpus("main", save_all(tmp_path / "main", recordings))
-        few = {name: METHODS[name] for name in ("logreg", "zhang", "holdfast")}
-        for module in (jobs, sample_tables, all_methods):
-            monkeypatch.setattr(module, "METHODS", few)
-        monkeypatch.setattr(run, "PARTS", ALL_PARTS)
-        monkeypatch.setattr(paper_tables, "QUICK_WINDOWS", (14,))
-        monkeypatch.setattr(paper_tables, "ABLATION_WINDOWS", (14,))
-        made = run_study(StudyPlan({"main": corpus}, quick=True), tmp_path / "out")
-        tables = {table.name: table for table in made}
-        missed = [
-            row for row in tables["events"].rows if row.keys["figure"] == "missed at 50 ms [%]"
-        ]
-        assert missed and all(row.ours is None and row.n == 0 for row in missed)
-        assert {"methods", "hands", *PAPER} <= set(tables)
-        assert "slips" not in tables  # no slips are known
-        report = (tmp_path / "out" / "report.md").read_text()
-        assert "only the thumb has labels of both classes" in report
-
-
-def _short(recording):
-    """The recording with stable labels of 0.4 s, and no label between them."""
-    labels = {
-        name: [replace(each, end=min(each.end, each.start + 0.4))
-               if each.state is ContactState.STABLE else each for each in module.labels]
-        for name, module in recording.modules.items()
-    }  # fmt: skip
-    return recording.with_labels(labels)
 
 
 def test_a_study_has_the_parts_of_the_paper_and_a_full_one_all(plan, monkeypatch, tmp_path):

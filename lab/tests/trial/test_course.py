@@ -4,7 +4,6 @@ import pytest
 from holdfast.twin.loads import Load, LoadKind
 from holdfast.twin.simulation import Grasp
 from holdfast_lab.trial.course import FALL_TIME, LEAD_TIME, TrialCourse, follow
-from holdfast_lab.trial.run import run_trial
 from holdfast_lab.trial.trials import Trial
 
 pytestmark = pytest.mark.slow
@@ -24,8 +23,3 @@ def test_a_course_goes_on_a_little_after_the_loss(instants):
     assert np.all(np.diff(course.times) > 0)
     assert course.least[-1] > course.least[0] > 0
     assert max(course.slip_speed) > 0.01
-
-
-def test_following_a_trial_changes_nothing(instants):
-    result = run_trial(CAN, "fixed", "builtin:noise-floor")
-    assert result.dropped == instants[-1].is_lost

@@ -30,15 +30,6 @@ def test_numbers_of_the_contract(document):
     assert len(document["trials"]) == 36
 
 
-def test_trials_that_no_force_holds_are_named(document):
-    assert document["infeasible"] == []
-    results = results_of(("fixed",), 3)
-    results["fixed"][1] = msgspec.structs.replace(results["fixed"][1], feasible=False)
-    found = document_of(TrialPlan(("fixed",), 3), results, None)
-    assert [trial["number"] for trial in found["infeasible"]] == [1]
-    assert found["laws"]["fixed"]["n"] == 2
-
-
 def test_parts_add_up_to_the_whole(document):
     for law, row in document["laws"].items():
         parts = [document["seen_objects"], document["unseen_objects"]]
@@ -49,14 +40,6 @@ def test_parts_add_up_to_the_whole(document):
 def test_it_is_json_without_infinity(document):
     text = msgspec.json.encode(document)
     assert json.loads(text, parse_constant=pytest.fail)["trials"][0]["slip"] is None
-
-
-def test_a_model_file_is_named_without_its_folder(tmp_path):
-    from holdfast.detection import Model
-
-    Model.load("builtin:noise-floor").save(tmp_path / "mine.json")
-    plan = TrialPlan(("fixed",), 1, model=str(tmp_path / "mine.json"))
-    assert document_of(plan, results_of(("fixed",), 1), None)["model"] == "mine.json"
 
 
 class TestExample:

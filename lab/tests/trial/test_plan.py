@@ -21,15 +21,6 @@ def test_a_plan_refuses_what_cannot_be_run(given, message):
         TrialPlan(**given)
 
 
-def test_a_model_without_a_finger_is_refused(tmp_path):
-    model = Model.load("builtin:noise-floor")
-    one = model.fingers["*"]
-    lacking = msgspec.structs.replace(model, fingers={"thumb": one, "index": one, "middle": one})
-    lacking.save(tmp_path / "three.json")
-    with pytest.raises(ModelError, match="no ring"):
-        TrialPlan(model=str(tmp_path / "three.json"))
-
-
 def test_a_model_with_a_tare_of_a_recording_is_refused(tmp_path):
     model = msgspec.structs.replace(Model.load("builtin:noise-floor"), tare="0:1")
     model.save(tmp_path / "interval.json")
@@ -40,12 +31,3 @@ def test_a_model_with_a_tare_of_a_recording_is_refused(tmp_path):
 def test_a_worker_with_another_model_is_refused():
     with pytest.raises(ModelError, match="builtin:any"):
         run_numbered(0, 0, "fixed", "builtin:any", "another")
-
-
-def test_a_result_is_stored_for_its_plant():
-    tasks = {}
-    for plant in ("mild", "hard"):
-        plan = TrialPlan(("fixed",), 1, plant=plant)
-        tasks[plant] = [plan.trial_task(0, "fixed"), plan.course_task(0, "fixed")]
-    for mild, hard in zip(tasks["mild"], tasks["hard"], strict=True):
-        assert mild.arguments != hard.arguments

@@ -41,9 +41,3 @@ def test_a_rise_after_an_impact_answers_it(impacts):
     answered, late = hold(start + 0.1, impacts=impacts), hold(start + 0.6, impacts=impacts)
     assert [one.is_answered for one in answered.impacts] == [True] and answered.n_false == 0
     assert [one.is_answered for one in late.impacts] == [False] and late.n_false == 1
-
-
-def test_a_slide_after_an_impact_is_measured(impacts):
-    (slid,) = hold(1.0, impacts[0].start + 0.1, impacts).impacts
-    (other,) = hold(1.0, impacts[0].start - 0.1, impacts).impacts
-    assert slid.distance == pytest.approx(0.05 / RATE) and other.distance == 0.0

@@ -42,31 +42,6 @@ class TestCompare:
         assert found["force_ratio_mean"]["value"] == pytest.approx(0.25)
         assert found["false_reactions_per_minute"]["value"] == pytest.approx(-10.0)
 
-    def test_two_infinite_values_are_equal(self):
-        lost = [result(number=k, dropped=True, slip=math.inf, reaction=math.inf) for k in range(3)]
-        found = compare(lost, lost)
-        assert found["slid_less"] == {"value": 0.0, "interval": [0.0, 0.0]}
-        assert found["reacted_later"] == {"value": 0.0, "interval": [0.0, 0.0]}
-
-    def test_the_other_way_round_is_the_negative(self):
-        a = [result(number=k, force_ratio=1 + k / 4, slip=k / 1e3) for k in range(4)]
-        b = [result(number=k, dropped=k > 1, slip=0.0015) for k in range(4)]
-        there, back = compare(a, b), compare(b, a)
-        for name in ("dropped", "force_ratio_mean"):
-            assert there[name]["value"] == -back[name]["value"]
-            assert there[name]["interval"] == [-end for end in back[name]["interval"][::-1]]
-        assert there["slid_less"] == back["slid_more"]
-
-
-def test_rates_of_false_reactions_may_have_other_quiet_times():
-    ours = [result(number=k, n_false=1, quiet_time=3.0) for k in range(3)]
-    theirs = [result(number=k, n_false=1, quiet_time=1.5) for k in range(3)]
-    found = compare(ours, theirs)["false_reactions_per_minute"]
-    assert found["value"] == pytest.approx(-20.0)
-    assert found["interval"] == pytest.approx([-20.0, -20.0])
-    nothing = compare([], [])["false_reactions_per_minute"]
-    assert nothing == {"value": None, "interval": None}
-
 
 def test_a_trial_that_no_force_holds_is_left_out_for_every_law():
     infeasible = result(number=1, feasible=False, dropped=True, slip=math.inf)
@@ -83,15 +58,6 @@ def test_a_rise_before_the_slip_is_no_reaction():
     assert found["reaction_median"]["value"] == 0.04
     lost = result(raised_before=True, dropped=True, slip=math.inf)
     assert summarize([lost])["n_reacting"] == 0
-
-
-def test_long_slips_and_drops_have_their_shares_and_reasons():
-    slips = [result(slip=slip) for slip in (0.001, 0.002, 0.004)]
-    lost = result(dropped=True, drop_reason="limit of force", slip=math.inf)
-    found = summarize([*slips, lost])
-    assert found["slipped_over_3mm"]["value"] == 50.0
-    assert found["slip_p90"]["value"] is None
-    assert found["drops"] == {"limit of force": 1}
 
 
 LOST = {"dropped": True, "slip": math.inf}

@@ -1,9 +1,6 @@
-import tracemalloc
-
 import pytest
 
-from holdfast.cli.detect import output
-from holdfast.cli.detect.output import json_lines, print_tables, watch
+from holdfast.cli.detect.output import json_lines, watch
 from holdfast.contact import ContactEstimate, ContactState, Fault, Reason
 from holdfast.demo_data import BOX_SLIPS
 from holdfast.detection import Detector, Model, detect
@@ -60,25 +57,6 @@ def test_a_finger_that_is_not_updated_has_no_line(live_estimates):
     (text,) = json_lines(chunk_from_stream("grasp", [one]))
     assert text.count("\n") == 1
     assert '"finger":"index"' in text
-
-
-def test_the_summary_of_a_source_without_samples(capsys):
-    summary = DetectionSummary()
-    summary.add(EstimateChunk("xela://auto", {}, []))
-    assert (summary.to_dict()["fingers"], summary.to_dict()["events"]) == ({}, [])
-    print_tables(summary.to_dict(), 0.0)
-    assert capsys.readouterr().out.splitlines()[1].split()[:2] == ["hand", "0"]
-
-
-def test_lines_do_not_leak_memory(model, recording):
-    chunk = chunk_from_detection(detect(model, recording))
-    sum(len(block) for block in json_lines(chunk))
-    tracemalloc.start()
-    for _ in range(3):
-        sum(len(block) for block in json_lines(chunk))
-    left, _ = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert left < 100_000
 
 
 def chunk(*states, hand=None, **fields):
@@ -169,12 +147,3 @@ def test_of_the_hand_alone(capsys):
     assert [line.split()[2:5] for line in lines] == [
         ["finger1,", "hand", state] for state in ("STABLE", "UNSTABLE", "NO_CONTACT")
     ]
-
-
-def test_it_plays_at_its_speed(monkeypatch):
-    asked, real = [], output.open_source
-    monkeypatch.setattr(
-        output, "open_source", lambda path, speed: asked.append(speed) or real(path, speed=0)
-    )
-    watch("builtin:any", BOX_SLIPS, 2.0)
-    assert asked == [2.0]

@@ -20,7 +20,7 @@ from holdfast.live.publishers.xela_server import XelaServer
 from holdfast.live.stream_detector import StreamDetector
 from holdfast.metrics.masks import runs
 from holdfast.recordings import Recording, Tactile
-from holdfast.sensors import flat_sensor, sensor
+from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 
 FIELDS = [
@@ -204,13 +204,6 @@ class TestSlips:
             slips[name] = [(times[a], times[b], values[a:b].max()) for a, b in found]
         return slips
 
-    def test_lines_have_the_probability_and_no_message(self, capsys, sliding, grasp):
-        got, err = lines(capsys, sliding, grasp)
-        assert err == ""
-        for line in got:
-            assert (line["slip_probability"] is None) == (line["state"] == "UNKNOWN")
-            assert (line["cause"] == "slip") == ((line["slip_probability"] or 0) >= 0.5)
-
     def test_a_threshold_of_1_is_said_where_a_slip_would_be_shown(
         self, capsys, sliding, grasp, tmp_path
     ):
@@ -297,27 +290,11 @@ def test_another_rate_is_resampled_with_a_message(capsys, model, save):
     assert times == detect(Model.load(model), load_recording(slow)).fingers["thumb"].times.tolist()
 
 
-def test_a_tare_by_interval(capsys, model, grasp, tmp_path):
-    given = msgspec.structs.replace(Model.load(model), tare="40:41")
-    given.save(tmp_path / "interval.json")
-    got, _ = lines(capsys, tmp_path / "interval.json", grasp, "--rate", "strict")
-    assert got[0]["reason"] == "warm_up"
-    assert None not in got[0]["force"]
-
-
 def test_missing_fingers_are_reported(capsys, model, save):
     path = save(synthetic_recording("one", 1, ("index",)))
     got, err = lines(capsys, model, path)
     assert {line["finger"] for line in got} == {"index"}
     assert "thumb" in err and err.count("\n") == 1
-
-
-def test_real_uskin(capsys, data_folder, tmp_path):
-    source = data_folder / "uskin_pick_move" / "data_sample_2022-02-22-08-10-01"
-    assert main(["import", str(source), str(tmp_path)]) == 0
-    capsys.readouterr()
-    got, _ = lines(capsys, NOISE_FLOOR, tmp_path / f"{source.name}.parquet")
-    assert len(got) == 2 * 285
 
 
 @pytest.mark.parametrize("number", [None, signal.SIGINT, signal.SIGTERM])
@@ -374,13 +351,3 @@ def test_a_person_reads_no_times_since_1970(capsys, save):
     rows = capsys.readouterr().out.splitlines()
     start = next(k for k, row in enumerate(rows) if "1795364053.990 s" in row)
     assert 0 < float(rows[start + 2].split()[0]) < 12
-
-
-def test_features_that_a_sensor_has_too_few_taxels_for_are_named(capsys, save):
-    rng = np.random.default_rng(0)
-    which = flat_sensor("single", 1, 1, 0.005, 100.0, "count")
-    module = Tactile(which, np.arange(100) / 100, np.rint(rng.normal(0, 4, size=(100, 1, 3))))
-    path = save(Recording("a", {"thumb": module}))
-    got, err = lines(capsys, "builtin:any", path)
-    assert len(got) == 100
-    assert err.startswith("thumb: single has 1 taxel, too few for residual, ")

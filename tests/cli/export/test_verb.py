@@ -12,15 +12,6 @@ def grasp(grasps):
     return grasps / "new" / "grasp-2.parquet"
 
 
-def test_the_sizes_of_a_model_are_printed(capsys, tmp_path):
-    words = ("builtin:noise-floor", tmp_path / "model.h", "--sensor", "uskin-4x4", "--fingers", 2)
-    code, out, err = VERB.run(capsys, *words)
-    assert (code, err) == (0, "")
-    lines = out.splitlines()
-    assert lines[0].endswith("model.h: the detector of finger1, finger2")
-    assert [line.split()[0] for line in lines[1:]] == ["state", "constants"]
-
-
 def test_json_has_the_sizes(capsys, grasp, tmp_path):
     words = ("builtin:any", tmp_path / "model.h", "--like", grasp, "--float")
     document = VERB.document(capsys, *words)

@@ -3,11 +3,9 @@ from dataclasses import replace
 
 import pytest
 
-from holdfast.io import labels_path, load_labels, load_recording, save_labels, save_recording
-from holdfast.recordings import Recording, Tactile
-from holdfast.synthetic import synthetic_recording
+from holdfast.io import labels_path, load_labels, load_recording, save_recording
 
-from .helpers import FINGERS, refusal, run, run_json, save_manual_labels
+from .helpers import refusal, run, run_json, save_manual_labels
 
 
 def test_a_rule_labels_a_folder(capsys, folder):
@@ -28,23 +26,6 @@ def test_a_rule_labels_a_folder(capsys, folder):
         doubts = [one["confidence"] for one in each["doubtful"]]
         assert doubts == sorted(doubts)
         assert all(value < 0.8 for value in doubts)
-
-
-def test_the_table_and_what_hides_labels(capsys, folder):
-    """Times are relative where the clock of the recording counts from 1970."""
-    code, out, err = run(capsys, "auto", "signal", folder, "--dry-run")
-    assert code == 0
-    assert [line.split()[0] for line in out.splitlines()[1:3]] == ["one", "two"]
-    assert "2 of 2 recordings" in err and err.count("\n") == 1
-    recording = load_recording(folder / "one.parquet")
-    modules = {
-        name: Tactile(m.sensor, m.times + 1795364053.99, m.readings)
-        for name, m in recording.modules.items()
-    }
-    save_recording(Recording("late", modules), folder / "late.mcap")
-    lines = run(capsys, "auto", "signal", folder / "late.mcap", "--dry-run")[1].splitlines()
-    assert all(len(line) <= 80 for line in lines)
-    assert all(0 <= float(row.split()[1]) < 30 for row in lines[-5:])  # the least certain
 
 
 def test_recordings_that_begin_in_contact_have_their_first_sample_as_tare(capsys, folder):
@@ -107,19 +88,3 @@ def test_parameters_of_a_rule(capsys, folder):
     poses.write_text("time,x,y,z,qw,qx,qy,qz\n" + rows)
     found = run_json(capsys, "auto", "tracking", path, "--poses", poses)
     assert found["recordings"][0]["seconds"]["stable"] > 1
-
-
-def test_a_label_file_of_another_recording_is_left_alone(capsys, folder):
-    path = folder / "one.parquet"
-    save_labels(synthetic_recording("other", 5, FINGERS), path, author="rule:signal")
-    before = labels_path(path).read_bytes()
-    for words in (("auto", "signal", path), ("auto", "signal", path, "--force")):
-        assert "one.labels.json labels another recording" in refusal(capsys, *words)
-    assert labels_path(path).read_bytes() == before
-
-
-def test_a_read_only_label_file(capsys, folder):
-    path = folder / "one.parquet"
-    run_json(capsys, "auto", "signal", path)
-    labels_path(path).chmod(0o444)
-    assert "one.labels.json cannot be written" in refusal(capsys, "auto", "signal", path)

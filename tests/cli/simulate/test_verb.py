@@ -63,31 +63,6 @@ def test_json_lists_the_recordings(capsys, out):
         assert recording.truth is not None
 
 
-def test_existing_recordings_are_kept(capsys, out):
-    run(capsys, out, *ONE)
-    (path,) = out.iterdir()
-    before = (path.stat().st_mtime_ns, path.stat().st_ino)
-    code, printed, err = run(capsys, out, *ONE[:-4], "--repeats", 2, "--jobs", 1, "--json")
-    assert code == 0
-    assert json.loads(printed)["recordings"] == ["flask-case1-2"]
-    assert "1 of 2" in err
-    assert (path.stat().st_mtime_ns, path.stat().st_ino) == before
-    assert VERB.document(capsys, out, *ONE)["recordings"] == []
-
-
-def test_troubles_of_the_skins(capsys, out):
-    run(capsys, out, *ONE, "--faults", "zero-share=0.1, field=200")
-    recording = load_recording(out / "flask-case1-1.parquet")
-    assert recording.metadata["magnetic_faults"] == {
-        "field": 200.0, "turn_time": 8.0, "zero_share": 0.1, "drift": 0.0,
-        "invented_months": 0.0,
-    }  # fmt: skip
-    zeros = (recording.modules["thumb"].readings == 0).all(axis=2).any(axis=1)
-    assert 0.05 < zeros.mean() < 0.15
-    words = (*ONE, "--faults", "zero-share=0.1,field=200")
-    assert VERB.document(capsys, out, *words)["recordings"] == []
-
-
 def test_recordings_with_other_settings_are_replaced_by_force_only(capsys, out):
     run(capsys, out, *ONE)
     for words, text in (
@@ -185,22 +160,6 @@ def test_a_killed_run_can_be_continued(capsys, out):
         assert (out / name).read_bytes() == (other / name).read_bytes()
 
 
-MUG = """mug = {shape = "cylinder", size = [0.036, 0.05, 0.003], mass = 0.2, friction = [0.7, 0.55],
- texture = [10e-6, 1.5e-3], finger_height = 0.024, yaw = 0.0}""".replace("\n", "")
-
-
-def test_an_object_whose_name_is_a_path_stays_in_the_folder(capsys, tmp_path):
-    table = tmp_path / "mine.toml"
-    table.write_text(MUG.replace("mug", '"../../mug"', 1))
-    out = tmp_path / "a" / "b"
-    words = (out, "--table", table, "--cases", 1, "--repeats", 1, "--jobs", 1)
-    assert run(capsys, *words)[0] == 0
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a", "mine.toml"]
-    assert [path.name for path in out.parent.iterdir()] == ["b"]
-    assert load_dataset(out)[0].name == "../../mug-case1-1"
-    assert VERB.document(capsys, *words)["recordings"] == []
-
-
 def test_randomized_hands_are_simulated_and_kept(capsys, out):
     words = (out, "--randomize", "--repeats", 1, "--grasps", 2, "--jobs", 1)
     measured = (*words, "--measured", "noise,scan")
@@ -214,17 +173,3 @@ def test_randomized_hands_are_simulated_and_kept(capsys, out):
     assert VERB.document(capsys, *words, "--measured", "scan, noise")["recordings"] == []
     for other in (words, (*measured, "--seed", 9)):
         assert "hand0000-grasp01.parquet" in refusal(capsys, *other)
-
-
-@pytest.mark.parametrize(
-    ("words", "named"),
-    [
-        (("--randomize", "--grasps", 0), "--grasps"),
-        (("--grasps", 2), "--randomize"),
-        (("--measured", "scan"), "--randomize"),
-        (("--randomize", "--measured", "scan,glue"), "'glue'"),
-        (("--randomize", "--repeats", 0), "repeats"),
-    ],
-)
-def test_options_of_randomized_hands_are_checked(capsys, out, words, named):
-    assert named in refusal(capsys, out, *words)

@@ -1,7 +1,6 @@
 import json
 import os
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 
 import pytest
@@ -15,7 +14,6 @@ from holdfast.io import save_recording
 from holdfast.live.teaching.folder import TeachingFolder
 from holdfast.live.teaching.protocol import GraspResult
 from holdfast.live.teaching.steps import STEPS
-from holdfast.recordings import Label
 from holdfast.twin import webcam
 from training.build import handling_recording, normalised_model, sliding_recording
 
@@ -57,29 +55,6 @@ def test_a_model_is_written_with_what_it_finds(capsys, grasps, tmp_path):
     assert all(len(line) <= 80 for line in lines)
     assert run(capsys, "train", grasps, "-o", trained, "--for", "slip")[0] == 0
     assert trained.read_bytes() == out.read_bytes()
-
-
-BAD_LABELS = {
-    "no slip at all": ("STABLE", None, "0 slips in 0 of 3 recordings"),
-    "only slips": ("UNSTABLE", "slip", "samples that slide and 0 that hold still"),
-}
-
-
-@pytest.mark.parametrize("case", BAD_LABELS)
-def test_labels_that_teach_nothing_are_one_line(capsys, tmp_path, case):
-    state, cause, message = BAD_LABELS[case]
-    for seed in range(3):
-        recording = sliding_recording(seed)
-        modules = {
-            name: replace(module, labels=(Label(3.0, 14.0, state, cause),))
-            for name, module in recording.modules.items()
-        }
-        save_recording(
-            replace(recording, modules=modules, truth=None), tmp_path / f"{seed}.parquet"
-        )
-    code, printed, err = run(capsys, "teach", "--from", tmp_path, "-o", tmp_path / "new.json")
-    assert (code, printed, (tmp_path / "new.json").exists()) == (2, "", False)
-    assert message in err.splitlines()[-1]
 
 
 def test_no_hand_at_the_source_is_one_line(capsys, tmp_path, monkeypatch):

@@ -3,6 +3,7 @@ import json
 import sys
 import time
 from contextlib import nullcontext, redirect_stdout
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -79,22 +80,6 @@ def test_table(capsys):
     assert capsys.readouterr().out == table + "name  rate\n"
 
 
-def test_headings_of_a_wide_table_stand_above_their_numbers(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "20")
-    print_table(("", "missed in 0.1 s", "n"), [("thumb", 7.5, 14), ("hand", "-", 3)])
-    assert capsys.readouterr().out == (
-        "       missed in\n           0.1 s   n\nthumb        7.5  14\nhand           -   3\n"
-    )
-
-
-def test_numbers_are_never_cut(capsys, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "10")
-    print_table(("a", "b"), [("x" * 30, 123456789.5), ("y", 1.0)])
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == f"{'x' * 12}  123456789.5"
-    assert "".join(line.split()[0] for line in lines[1:4]) == "x" * 30
-
-
 @given(
     st.lists(st.text("ab-_/. ", max_size=300), min_size=1, max_size=5),
     st.lists(st.integers(0, 10**6), min_size=1, max_size=4),
@@ -142,20 +127,23 @@ class TestSilence:
             while time.monotonic() < deadline and not terminal.getvalue():
                 time.sleep(0.01)
         assert terminal.getvalue() == "tune: working ...\n"
-        assert console._silence is None
 
     @pytest.mark.parametrize("shows", [print_line, print_message, print_json])
     def test_the_first_line_ends_the_silence(self, monkeypatch, shows):
-        terminal = self.on_terminal(monkeypatch, 60.0)
+        self.on_terminal(monkeypatch, 60.0)
+        calls = []
+        timer = SimpleNamespace(
+            start=lambda: calls.append("start"), cancel=lambda: calls.append("cancel")
+        )
+        monkeypatch.setattr(console, "Timer", lambda *_: timer)
         with console.break_silence("tune: working ..."):
-            waiting = console._silence
             shows("done")
-            assert console._silence is None and waiting.finished.is_set()
-        assert "working" not in terminal.getvalue()
+            assert calls == ["start", "cancel"]
 
-    def test_a_pipe_gets_no_such_line(self):
+    def test_a_pipe_gets_no_such_line(self, monkeypatch):
+        monkeypatch.setattr(console, "Timer", None)
         with console.break_silence("tune: working ..."):
-            assert console._silence is None
+            pass
 
     def test_every_verb_is_watched(self, monkeypatch):
         seen = []

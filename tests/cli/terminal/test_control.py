@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from holdfast.cli.terminal.control import KEY_HELP, MARKER_KEYS, STOP_KEY, MarkerKeys
+from holdfast.cli.terminal.control import MarkerKeys
 
 
 class Stdin:
@@ -63,10 +63,3 @@ def test_in_the_background_a_terminal_is_left_alone(monkeypatch):
         assert not keys.interactive
     os.close(master)
     os.close(terminal)
-
-
-def test_the_key_help_names_all_keys():
-    for key, label in MARKER_KEYS.items():
-        assert key in "123456789 " or f"{key} {label}" in KEY_HELP
-    assert f"{STOP_KEY} stops" in KEY_HELP
-    assert STOP_KEY not in MARKER_KEYS

@@ -1,4 +1,4 @@
-import math
+import sys
 import time
 
 import pytest
@@ -74,32 +74,22 @@ def test_no_remaining_time_before_three_percent(capsys, clock):
 def test_a_bar_appears_before_the_first_step_is_done(capsys, monkeypatch):
     on_terminal(monkeypatch)
     monkeypatch.setattr(module, "DISPLAY_DELAY", 0.01)
-    with ProgressBar("working", 3) as bar:
+    with ProgressBar("working", 3):
         ends = time.monotonic() + 20
-        while bar._bar is None and time.monotonic() < ends:
+        while not sys.stderr.getvalue() and time.monotonic() < ends:
             time.sleep(0.01)
     err = capsys.readouterr().err
     assert "working" in err
     assert "-:--:--" in err
 
 
-def test_a_bar_shows_the_remaining_time(capsys, monkeypatch, clock):
+def test_a_bar_shows_the_share(capsys, monkeypatch, clock):
     on_terminal(monkeypatch)
     with ProgressBar("working", 10) as bar:
         bar.advance()
-        clock(2.9)
-        assert math.isnan(bar._expected_duration())
-        clock(57.1)
+        clock(60.0)
         bar.advance(0.0)
-        assert bar._expected_duration() == pytest.approx(600.0)
-    assert "10%" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize("is_terminal", [False, True])
-def test_a_quick_task_shows_no_bar(is_terminal, capsys, monkeypatch):
-    monkeypatch.setattr("sys.stderr.isatty", lambda: is_terminal, raising=False)
-    assert list(progress(iter("ab"), "counting", total=2)) == ["a", "b"]
-    assert capsys.readouterr() == ("", "")
+    assert " 10%" in capsys.readouterr().err
 
 
 class PlayedServer:

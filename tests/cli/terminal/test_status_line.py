@@ -83,14 +83,3 @@ def test_on_a_terminal_it_is_rewritten_in_place(colours, red, monkeypatch):
     assert printed.count("no samples") == 2  # and once more at the end
     assert printed.endswith("\x1b[2K")  # then it goes
     assert ("31m" in printed) is red
-
-
-def test_a_narrow_terminal_cuts_it(monkeypatch):
-    terminal = Terminal()
-    monkeypatch.setattr("sys.stderr", terminal)
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setenv("COLUMNS", "30")
-    with StatusLine(Still(BAD)) as shown:
-        shown.update()
-    assert "no samples" in terminal.getvalue()
-    assert "markers" not in terminal.getvalue()

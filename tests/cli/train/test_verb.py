@@ -89,15 +89,6 @@ def test_a_model_is_adapted(capsys, data, model):
     assert adapted.fingers == train(load_dataset(data), setting).model.fingers
 
 
-def test_tare_and_hold_override_the_model_to_adapt(capsys, data, model):
-    words = ["--init", TWIN, "--trials", 0, "--tare", 0.3, "--hold", 0.25, "--hysteresis", 0.2]
-    words += ["--shared"]
-    assert run(capsys, data, "-o", model, *words)[0] == 0
-    adapted = Model.load(model)
-    assert list(adapted.fingers) == ["*"]
-    assert (adapted.tare, adapted.debounce) == ("0.3", Debounce(0.0, 0.2, 0.25))
-
-
 def test_hold_and_our_own_features(capsys, data, model):
     words = ["--features", "holdfast", "--hold", 0.2, "--trials", 0, "--own-slip-features"]
     code, _, err = run(capsys, data, "-o", model, *words)

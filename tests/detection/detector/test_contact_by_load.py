@@ -1,11 +1,10 @@
 """Contact by the load of the stream, as `builtin:any` decides it."""
 
-import msgspec
 import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNSTABLE
-from holdfast.detection import Debounce, Model, detect
+from holdfast.detection import Model, detect
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 
@@ -109,12 +108,6 @@ def test_a_touch_after_a_release_rises_from_what_that_left(name):
     assert (states[-100:] == STABLE).all()
 
 
-def test_a_light_grip_is_held_and_released():
-    states = states_of(steps((1, 0), (0.2, 0.025), (5, 0.025), (0.2, 0), (3, 0)))
-    assert (states[250:620] == STABLE).all()
-    assert (states[690:] == NO_CONTACT).all()
-
-
 def test_shear_that_draws_the_normal_force_down_is_held():
     """As a magnetic skin: the shear grows, and its normal readings fall at some taxels."""
     n = round(6 * RATE)
@@ -128,43 +121,12 @@ def test_shear_that_draws_the_normal_force_down_is_held():
     assert (states[150:] == STABLE).all()
 
 
-def loads(shares):
-    """(n, 3) forces by a share of the load at each sample."""
-    return np.asarray(shares)[:, None] * LOADED
-
-
-def test_a_short_dip_of_the_load_is_no_loss_of_contact():
-    shares = np.concatenate(
-        [np.zeros(100), np.full(300, 0.05), np.full(15, 0.002), np.full(200, 0.05)]
-    )
-    states = states_of(loads(shares))
-    assert (states[110:] != NO_CONTACT).all()
-
-
-def test_a_load_that_stays_low_is_a_loss_of_contact():
-    shares = np.concatenate([np.zeros(100), np.full(300, 0.05), np.full(200, 0.002)])
-    states = states_of(loads(shares))
-    assert (states[300:400] == STABLE).all()
-    assert (states[450:] == NO_CONTACT).all()
-
-
 def test_a_finger_that_touches_is_unstable_at_first():
     states = states_of(steps((1, 0), (1, 0.06), (2, 0.06)))
     first = int(np.argmax(states[1:] != NO_CONTACT)) + 1
     assert 100 <= first < 200
     assert (states[first : first + 10] == UNSTABLE).all()
     assert (states[330:] == STABLE).all()
-
-
-def test_a_force_that_leaves_keeps_its_probability():
-    """It is UNSTABLE by its force: the probability is that of the features."""
-    model = Model.load("builtin:any")
-    raw = msgspec.structs.replace(model.with_threshold("stable", 0.0), debounce=Debounce())
-    trace = detect(raw, recording_of(steps((1, 0), (0.3, 1), (4, 1), (0.2, 0), (2, 0)))).fingers[
-        "a"
-    ]
-    leaving = trace.state == UNSTABLE
-    assert leaving.any() and (trace.stable_probability[leaving] > 0).all()
 
 
 @pytest.mark.parametrize(("share", "noise"), [(0.4, 1e-3), (1.8, 1e-3), (0.3, 8e-3)])
@@ -174,18 +136,6 @@ def test_a_force_of_which_a_large_share_comes_or_goes_at_once_is_unstable(share,
     assert (states[250:525] == STABLE).all()
     assert (states[538:545] == UNSTABLE).all()
     assert (states[600:] == STABLE).all()
-
-
-def test_a_force_that_swings_slowly_is_not_unsteady():
-    sway = 1 + 0.3 * np.sin(2 * np.pi * 0.4 * np.arange(400) / RATE)
-    raw = msgspec.structs.replace(
-        Model.load("builtin:any").with_threshold("stable", 0.0), debounce=Debounce()
-    )
-    recording = recording_of(
-        np.concatenate([steps((1, 0), (0.3, 1), (2, 1)), sway[:, None] * LOADED])
-    )
-    states = detect(raw, recording).fingers["a"].state
-    assert (states[200:] == STABLE).all()
 
 
 POLES = np.array([400, -600, 480, -480, 200.0])

@@ -42,21 +42,6 @@ def test_a_hold_at_a_quarter_of_the_grip_is_contact():
     assert not {NO_CONTACT, UNKNOWN} & set(states[105:])
 
 
-def test_a_touch_after_a_release_is_contact():
-    forces = relaxing(0.05)
-    forces[900:] += 600.0
-    states = states_of(forces)
-    assert set(states[700:900]) == {NO_CONTACT}
-    assert NO_CONTACT not in states[901:]
-
-
-def test_a_contact_ends_below_a_share_of_the_threshold():
-    forces = np.concatenate([np.zeros(100), np.full(100, 160.0), np.full(300, 85.0), np.zeros(100)])
-    states = states_of(forces)
-    assert NO_CONTACT not in states[105:495]
-    assert set(states[505:]) == {NO_CONTACT}
-
-
 def test_an_empty_finger_that_drifts_far_is_no_contact():
     drift = np.linspace(0.0, 8.0 * THRESHOLD, round(60 * RATE))
     assert set(states_of(drift)[40:]) == {NO_CONTACT}

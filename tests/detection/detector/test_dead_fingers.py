@@ -79,14 +79,6 @@ def test_the_rule_of_the_kernel_is_that_of_python():
     assert len(seen) >= 10
 
 
-@pytest.mark.parametrize(("value", "is_dead"), [(0.0, False), (7.0, True)])
-def test_a_sensor_that_rests_at_zero_is_dead_at_other_constants_alone(value, is_dead):
-    which = replace(TIP, range=None, rests_at_zero=True)
-    found = estimates(which, thumb=np.full((100, 6, 3), value))
-    assert found[-1].fingers["thumb"].is_dead == is_dead
-    assert found[-1].state is (UNKNOWN if is_dead else NO_CONTACT)
-
-
 @pytest.mark.parametrize("value", [0.0, 7.0, 200.0])
 def test_a_finger_that_is_plugged_in_is_alive_at_once_and_takes_a_new_tare(value):
     """Its constants were no zero: an open finger is never in contact."""
@@ -97,12 +89,3 @@ def test_a_finger_that_is_plugged_in_is_alive_at_once_and_takes_a_new_tare(value
     assert [finger.faults for finger in thumb[149:151]] == [(Fault.DEAD,), ()]
     assert {finger.reason for finger in thumb[150:170]} == {Reason.TARE}
     assert {finger.state for finger in thumb[175:]} == {NO_CONTACT}
-
-
-def test_a_coarse_sensor_that_rests_keeps_its_tare_in_a_touch():
-    """Less noise than a step: two taxels of six change first, and feel the touch at once."""
-    values = np.full((300, 6, 3), 200.0)
-    values[150:, :2, 0] += [100.0, 90.0] + np.arange(150)[:, None] % 2
-    thumb = [estimate.fingers["thumb"] for estimate in estimates(thumb=values)]
-    assert (thumb[149].faults, thumb[150].faults) == ((Fault.DEAD,), ())
-    assert {finger.state for finger in thumb[150:]} == {STABLE}

@@ -3,7 +3,6 @@ import itertools
 import pickle
 import sys
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -112,16 +111,6 @@ class TestReasons:
         expected = [("gap", 5), ("", 15)] if gap else [("", 20)]
         assert runs(estimates, lambda e: e.reason) == expected
 
-    def test_jitter_is_no_gap(self):
-        rng = np.random.default_rng(0)
-        times = np.arange(200) / RATE + rng.uniform(-0.9, 0.9, size=200) / RATE
-        detector = Detector(model(("thumb",)))
-        estimates = [
-            detector.update({"thumb": sample}, time).fingers["thumb"]
-            for sample, time in zip(lively(), np.sort(times), strict=True)
-        ]
-        assert Reason.GAP not in {e.reason for e in estimates}
-
     def test_a_missing_finger_keeps_its_estimate_for_three_periods(self):
         detector = Detector(model())
         values = lively()
@@ -133,24 +122,6 @@ class TestReasons:
         assert {e.fingers["index"].time for e in estimates} == {49 / RATE}
         assert {e.fingers["thumb"].reason for e in estimates} == {Reason.NONE}
         assert np.isnan(estimates[-1].fingers["index"].force).all()
-
-    def test_a_finger_without_any_sample(self):
-        detector = Detector(model())
-        estimate = detector.update({"thumb": lively(1)[0]}, 0.0).fingers["index"]
-        assert (estimate.state, estimate.reason) == (UNKNOWN, Reason.TARE)
-        assert np.isnan(estimate.time)
-
-    def test_repeated_samples_count(self):
-        values = np.repeat(lively(30), 2, axis=0)
-        estimates = feed(Detector(model(("thumb",))), values)
-        assert runs(estimates, lambda e: e.reason) == [("tare", 20), ("warm_up", 5), ("", 35)]
-
-    def test_the_tare_stays_over_a_gap(self):
-        detector = Detector(model(("thumb",)))
-        values = lively(80)
-        one = feed(detector, values)
-        two = feed(detector, values[60:], start=100.0)
-        assert [e.force for e in two] == [e.force for e in one[60:]]
 
 
 class TestContactThreshold:
@@ -170,17 +141,6 @@ class TestContactThreshold:
         estimates = feed(Detector(by_force(), {"f": FLAT}), [flat(1.0, k) for k in range(3)], "f")
         assert (estimates[-1].state, estimates[-1].stable_probability) == (NO_CONTACT, 0.0)
 
-    def test_by_noise(self):
-        rng = np.random.default_rng(0)
-        values = rng.normal(scale=3.0, size=(600, 1, 3))
-        values[300:, 0, 0] += 40.0
-        hand_model = Model(
-            fingers={ANY_FINGER: finger_model(contact_noise=5.0)}, window=6, rate=RATE
-        )
-        estimates = feed(Detector(hand_model, {"f": FLAT}), values, "f")
-        assert {e.state for e in estimates[60:300]} == {NO_CONTACT}
-        assert NO_CONTACT not in {e.state for e in estimates[300:]}
-
 
 class TestDebounce:
     def test_a_state_is_reported_when_it_has_lasted(self):
@@ -197,19 +157,6 @@ class TestDebounce:
             UNKNOWN, STABLE, STABLE, UNKNOWN, UNKNOWN, UNSTABLE,
         ]  # fmt: skip
 
-    def test_a_fault_without_a_force_is_reported_at_once(self):
-        """A sensor of one taxel at the end of its range shows no force, however short that is."""
-        hand_model = by_force(debounce=Debounce(min_duration=0.03))
-        detector = Detector(hand_model, {"finger1": replace(FLAT, range=(-500.0, 500.0))}, RATE)
-        readings = np.zeros((30, 1, 3))
-        readings[:, 0, 0] = 150.0 + np.arange(30) % 2
-        readings[[10, 11], 0, 1] = 500.0
-        found = feed(detector, readings, "finger1")
-        assert {(e.state, e.reason) for e in found[8:10]} == {(STABLE, Reason.NONE)}
-        assert {(e.state, e.reason) for e in found[10:12]} == {(UNKNOWN, Reason.FAULT)}
-        assert [e.faults for e in found[9:13]] == [(), *[(Fault.SATURATED,)] * 2, ()]
-        assert {(e.state, e.reason) for e in found[20:]} == {(STABLE, Reason.NONE)}
-
     def test_instability_is_held(self):
         hand_model = by_force(debounce=Debounce(hold=0.05))
         estimates = pushes(
@@ -217,25 +164,12 @@ class TestDebounce:
         )
         assert estimates[1:] == [STABLE] * 4 + [UNSTABLE] * 5 + [STABLE] * 4
 
-    def test_no_contact_is_not_held(self):
-        hand_model = by_force(debounce=Debounce(hold=0.5))
-        estimates = pushes(
-            Detector(hand_model, {"finger1": FLAT}, RATE), [110] * 5 + [90] + [0] * 2 + [110]
-        )
-        assert estimates[1:] == [STABLE] * 4 + [UNSTABLE] + [NO_CONTACT] * 2 + [UNSTABLE]
-
     def test_hysteresis_moves_the_threshold_away(self):
         hand_model = by_force(debounce=Debounce(hysteresis=0.2))  # 0.3 and 0.7 are 91.5 and 108.5
         forces = [50, 50, 101, 108, 109, 101, 92, 91, 108]
         found = pushes(Detector(hand_model, {"finger1": FLAT}), forces)
         expected = [UNSTABLE] * 3 + [STABLE] * 3 + [UNSTABLE] * 2
         assert found[1:] == expected
-
-    def test_a_gap_forgets_the_candidate(self):
-        hand_model = by_force(debounce=Debounce(min_duration=0.05))
-        detector = Detector(hand_model, {"finger1": FLAT})
-        pushes(detector, [150] * 5 + [50] * 2)
-        assert pushes(detector, [150] * 4, start=9.0)[1:] == [STABLE] * 3
 
 
 HANDS = {
@@ -281,15 +215,6 @@ class TestEvents:
         assert len(events) == MAX_EVENTS
         assert events[-1].time == pytest.approx(1799 / RATE)
 
-    def test_the_newest_of_a_run_are_kept(self):
-        values = np.zeros((1800, 1, 3))
-        values[:, 0, 0] = [150, 50] * 900
-        module = type(tactile())(FLAT, np.arange(1800) / RATE, values)
-        one, two = (Detector(by_force(), {"finger1": FLAT}) for _ in range(2))
-        pushes(one, values[:, 0, 0])
-        two.run(recording(finger1=module))
-        assert two.events() == one.events()
-
 
 def test_reset_forgets_everything():
     detector, values = Detector(model()), lively()
@@ -323,18 +248,6 @@ def test_a_refused_update_changes_nothing(samples, time, message):
         given = {"index": values[k]} if k == 50 else {"thumb": values[k], "index": values[k]}
         assert repr(one.update(given, k / RATE)) == repr(two.update(given, k / RATE))
     assert one.events() == two.events()
-
-
-@pytest.mark.parametrize("time", [np.nan, np.inf, -np.inf])
-def test_refuses_a_first_time_that_is_not_finite(time):
-    with pytest.raises(StreamError, match="time"):
-        Detector(model()).update({}, time)
-
-
-@pytest.mark.parametrize("time", [1, np.float32(1), np.int64(1)])
-def test_times_of_any_type(time):
-    estimate = Detector(model()).update({"thumb": lively(1)[0]}, time)
-    assert (estimate.time, type(estimate.time)) == (1.0, float)
 
 
 def test_a_sample_is_not_aliased():
@@ -469,12 +382,6 @@ class TestThresholds:
         changed.reset()  # keeps the thresholds
         assert states == pushes(changed, forces, "f")
 
-    def test_a_change_acts_from_the_next_sample_on(self):
-        detector, values = Detector(by_force(), {"f": FLAT}), [110.0] * 10
-        assert pushes(detector, values, "f")[-1] is STABLE
-        detector.set_thresholds({"f": 0.95})
-        assert pushes(detector, values, "f", start=1.0)[-1] is UNSTABLE
-
     def test_another_finger_keeps_its_threshold(self):
         detector = Detector(by_force(), {"f": FLAT, "g": FLAT})
         detector.set_thresholds({"f": 0.95})
@@ -488,18 +395,6 @@ class TestThresholds:
     def test_thresholds_outside_of_0_to_1_are_refused(self, value):
         with pytest.raises(ValueError, match="threshold"):
             Detector(model()).set_thresholds({"thumb": value, "index": value})
-
-    def test_an_unknown_finger_is_refused(self):
-        with pytest.raises(ValueError, match="ring"):
-            Detector(model()).set_thresholds({"thumb": 0.5, "ring": 0.5})
-
-
-def test_samples_that_python_converts_give_the_same_estimates():
-    values = lively()
-    expected = feed(Detector(model(("thumb",))), values)
-    for convert in (np.float32, np.int64, np.ndarray.tolist, lambda v: v[::-1].copy()[::-1]):
-        found = feed(Detector(model(("thumb",))), [convert(value) for value in values])
-        assert [repr(estimate) for estimate in found] == [repr(e) for e in expected]
 
 
 @pytest.mark.parametrize(

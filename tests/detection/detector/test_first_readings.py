@@ -89,14 +89,6 @@ def test_an_open_hand_is_open_whatever_the_first_readings(name, seed):
     assert (found[:195] != STABLE).all()
 
 
-@pytest.mark.parametrize("name", FIRST)
-def test_so_it_is_with_a_tare_by_seconds(name):
-    found = states(FIRST[name](*grasp()), "builtin:noise-floor")
-    assert (found[:195] != STABLE).all()
-    assert (found[115:195] == NO_CONTACT).all() and (found[900:] == NO_CONTACT).all()
-    assert (found[300:750] == STABLE).all()
-
-
 TIMES = np.arange(1000) / RATE
 LOADED = {
     "held": np.ones(1000),

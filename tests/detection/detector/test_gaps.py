@@ -90,14 +90,6 @@ def test_a_longer_gap_begins_anew():
     assert trace.state[first + 1] == STABLE
 
 
-def test_windows_of_samples_begin_anew_after_three_periods():
-    times = with_gaps(150.0, 0.06)
-    trace = trace_of(times, "builtin:noise-floor")
-    starts = np.flatnonzero(np.diff(times) > 0.03) + 1
-    assert (trace.state[starts] == UNKNOWN).all()
-    assert (trace.state[starts[starts > 300] + 5] == UNKNOWN).all()
-
-
 @pytest.mark.parametrize("name", ["slip_probability", "stable_probability"])
 def test_an_even_motion_looks_the_same_at_other_times(name):
     """A slow and even motion is no slip where the times are uneven."""

@@ -7,11 +7,8 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Reason
 from holdfast.detection import Detector, Model, detect
-from holdfast.devices.sources import Arrival
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from live import build
 
 RATE = 100.0
 SHARE = np.array([0.05, -0.03, 0.2])
@@ -54,13 +51,6 @@ def test_after_the_release_there_is_no_contact(name, unit):
     assert (trace.state[375:] == NO_CONTACT).all()
 
 
-@pytest.mark.parametrize("name", MODELS)
-def test_a_grip_that_gives_a_little_is_still_held(name):
-    shares = np.concatenate([np.ones(300), np.linspace(1, 0.97, 50), np.full(300, 0.97)])
-    trace = detect(Model.load(name), held(shares), in_contact=True).fingers["a"]
-    assert (trace.state != NO_CONTACT).all()
-
-
 def test_a_pull_is_unstable():
     shares = np.concatenate([np.ones(200), 1 + 0.5 * np.sin(np.arange(100) / 4)])
     trace = detect(Model.load("builtin:any"), held(shares), in_contact=True).fingers["a"]
@@ -98,12 +88,6 @@ def test_a_wrong_baseline_is_refused(values):
         detect(Model.load("builtin:any"), recording)
 
 
-def test_baselines_of_another_type_are_refused():
-    recording = held(np.ones(10), starts_loaded=True, baselines=[1, 2])
-    with pytest.raises(ValueError, match="baselines"):
-        detect(Model.load("builtin:any"), recording)
-
-
 def test_a_reset_keeps_the_declaration_unless_told():
     detector = Detector(
         Model.load("builtin:noise-floor"), {"a": sensor("uskin-4x4")}, RATE, in_contact=True
@@ -114,21 +98,3 @@ def test_a_reset_keeps_the_declaration_unless_told():
         detector.update({"a": readings[0]}, 0.0)
         estimate = detector.update({"a": readings[1]}, 0.01).fingers["a"]
         assert estimate.state.code == UNKNOWN and estimate.reason is reason
-
-
-@pytest.mark.parametrize("by_metadata", [True, False])
-@pytest.mark.parametrize("name", MODELS)
-def test_live_equals_offline(name, by_metadata):
-    model, recording = Model.load(name), held(released(2.0))
-    source = build.Script({"a": sensor("uskin-4x4")})
-    source.metadata = {"starts_loaded": True} if by_metadata else {}
-    live = StreamDetector(model, source, in_contact=not by_metadata)
-    module, found = recording.modules["a"], []
-    for k, time in enumerate(module.times.tolist()):
-        found += live.update(Arrival(time, {"a": module.readings[k]}, time)).estimates
-    trace = detect(model, recording, in_contact=True).fingers["a"]
-    assert [each.estimate.fingers["a"].state.code for each in found] == trace.state.tolist()
-    live.restart_tare()  # of an open hand
-    (estimate,) = live.update(Arrival(9.0, {"a": module.readings[-1]}, 9.0)).estimates
-    expected = Reason.TARE if name == "builtin:noise-floor" else Reason.WARM_UP
-    assert estimate.estimate.fingers["a"].reason is expected

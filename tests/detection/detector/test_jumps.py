@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, Fault, faults_of
-from holdfast.detection import Detector, Model, detect
+from holdfast.detection import Model, detect
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import built_in_sensors, sensor
 
@@ -105,23 +105,6 @@ def test_the_first_touch_of_one_taxel_is_no_fault_that_lasts(skin, seconds):
     assert not traced(which, readings, "builtin:any").faults[203:].any()
 
 
-@pytest.mark.parametrize("skin", ["anyskin", "uskin-4x4"])
-def test_a_magnetic_skin_needs_no_touch_before(skin):
-    readings = grasp(SKINS[skin])
-    readings[100:, 3, 1] += 9830.0
-    trace = traced(SKINS[skin], readings, "builtin:any")
-    assert named(trace)[0].tolist() == [*range(100, 1000)]
-    assert (trace.state[OPEN] == NO_CONTACT).all()
-
-
-def test_under_five_taxels_a_far_jump_may_be_a_touch():
-    which = SKINS["anyskin"]
-    few = replace(which, name="few", positions=which.positions[:4], rotations=which.rotations[:4])
-    readings = grasp(few)
-    readings[500:, 3, 2] += 9830.0
-    assert not traced(few, readings, "builtin:any").faults[501:].any()
-
-
 def rezeroed(which, at=500):
     """The driver takes a new baseline in the grip."""
     readings = grasp(which)
@@ -166,26 +149,3 @@ def test_a_force_that_returns_shows_that_the_zero_is_the_same(model):
     assert named(trace)[0].tolist() == [500, 501, 502]
     assert (trace.state[HELD] != NO_CONTACT).all()
     assert (trace.state[530:750] == STABLE).all()
-
-
-def test_a_hand_that_lets_go_in_two_samples_has_released():
-    which = SKINS["in newtons"]
-    readings = grasp(which)
-    readings[800:] = readings[:200]
-    readings[799] = (readings[798] + readings[800]) / 2
-    trace = traced(which, readings, "builtin:any")
-    assert not trace.faults.any()
-    assert (trace.state[850:] == NO_CONTACT).all()
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_live_is_as_batch(model):
-    which = SKINS["anyskin"]
-    readings = rezeroed(which, at=600)
-    readings[450:550, 2, 0] -= 9830.0
-    trace = traced(which, readings, model)
-    detector = Detector(Model.load(model), {"thumb": which}, 100.0)
-    for k, sample in enumerate(readings):
-        finger = detector.update({"thumb": sample}, TIMES[k]).fingers["thumb"]
-        assert finger.state.code == trace.state[k]
-        assert finger.faults == faults_of(int(trace.faults[k]))

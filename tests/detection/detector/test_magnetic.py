@@ -78,13 +78,6 @@ def test_a_press_of_all_taxels_alike_is_a_load():
     assert (trace.state[(times > 4.5) & (times < 8.9)] == STABLE).all()
 
 
-def test_a_shear_of_all_taxels_alike_is_lost():
-    """It cannot be told from a field."""
-    recording = turned((40, 0, 0), seconds=0.5)
-    trace, times = detect(ANY, recording).fingers["thumb"], recording.modules["thumb"].times
-    assert (trace.state[(times > 1) & (times < 8.9)] == NO_CONTACT).all()
-
-
 def shared(name, shares, *, grip=0.0, palm=True, field=(6, 12, 60)):
     """A hand that turns from 5 to 8 s, and may hold from 2 s on; its palm lies another way."""
     which, rng, times = sensor(name), np.random.default_rng(4), np.arange(1200) / 100
@@ -119,28 +112,6 @@ def test_an_open_module_decides_what_may_be_a_field_or_a_load(name, shares):
     assert (alone.state[times > 9] != NO_CONTACT).all()
 
 
-@pytest.mark.parametrize("field", [(6, 12, 60), (35, -40, 30), (61, 0, 0)])
-@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
-def test_an_open_module_shows_the_field_that_a_load_hides(name, field):
-    def change(palm):
-        times, fingers = shared(name, [1.0], grip=300, palm=palm, field=field)
-        force = fingers["thumb"].force
-        before, after = (
-            force[(times > a) & (times < b)].mean(axis=0) for a, b in ((4, 5), (9, 12))
-        )
-        return float(np.linalg.norm(after - before)) / sensor(name).n_taxels
-
-    assert change(palm=True) < 0.3 * change(palm=False)
-
-
-@pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
-def test_a_press_while_another_module_does_not_turn_is_a_load(name):
-    times, fingers = shared(name, [0.0], grip=300)
-    clean = shared(name, [0.0], grip=300, palm=False)[1]["thumb"]
-    assert fingers["thumb"].force == pytest.approx(clean.force, nan_ok=True)
-    assert (fingers["thumb"].state[times > 3] == STABLE).all()
-
-
 def changed(shares, seconds=6.0):
     """A finger whose taxels change by these shares of a vector from 2 s on."""
     which, n = sensor("anyskin"), round(100 * seconds)
@@ -161,16 +132,6 @@ def test_what_may_be_a_field_or_a_load_is_a_fault_and_no_state():
 def test_a_field_beyond_that_of_the_earth_is_a_fault():
     trace = detect(ANY, changed(np.full(5, 3.0))).fingers["thumb"]
     assert {faults_of(mask) for mask in trace.faults[300:].tolist()} == {(Fault.FIELD,)}
-
-
-def test_a_dead_taxel_hides_no_field():
-    recording = turned((35, -40, 30))
-    module = recording.modules["thumb"]
-    readings = np.array(module.readings)
-    readings[:, 1] = 17.0
-    spoiled = Recording("dead", {"thumb": Tactile(module.sensor, module.times, readings)})
-    trace = detect(ANY, spoiled).fingers["thumb"]
-    assert (trace.state[(module.times > 4) & (module.times < 9)] == NO_CONTACT).all()
 
 
 def still_hold(n=1000, rate=100.0, seed=13):
@@ -205,29 +166,12 @@ def test_readings_of_one_sample_change_no_state(value, in_contact):
     assert (trace.state[300:850] == STABLE).all()
 
 
-@pytest.mark.parametrize("value", SPOILED.values(), ids=SPOILED)
-def test_readings_before_the_noise_is_known_are_found(value):
-    times, readings, _ = still_hold()
-    readings[5, 2] = readings[20, 3] = value
-    assert np.flatnonzero(estimates(times, readings).faults).tolist() == [5, 20]
-    trace = estimates(times, readings, sensor("anyskin"))
-    assert np.flatnonzero(trace.faults).tolist() == [5, 20]
-
-
 def test_a_magnetometer_that_goes_on_sending_zeros_is_left_out():
     times, readings, _ = still_hold()
     readings[500:, 3] = 0
     trace = estimates(times, readings)
     assert (trace.faulty_taxels[500:, 0] == 8).all()
     assert (trace.state[500:890] == STABLE).all()
-
-
-def test_all_magnetometers_at_zero_are_no_sample():
-    times, readings, _ = still_hold()
-    readings[400:405] = 0
-    trace = estimates(times, readings)
-    assert (trace.state[400:405] == UNKNOWN).all()
-    assert {faults_of(mask) for mask in trace.faults[400:405].tolist()} == {(Fault.INVALID,)}
 
 
 @pytest.mark.parametrize("name", ["anyskin", "uskin-4x4"])
@@ -263,26 +207,6 @@ def test_a_jump_that_stays_is_accepted_at_the_second_sample():
     times, readings, _ = still_hold()
     readings[500:, 3, 0] += 500
     assert np.flatnonzero(estimates(times, readings).faults).tolist() == [500]
-
-
-def test_zeros_of_other_sensors_are_readings():
-    """A sensor with a dead band falls to zero when it is released."""
-    times, readings, _ = still_hold()
-    readings[500:, 3] = 0
-    which = sensor("anyskin")
-    other = type(which)(
-        "other", which.positions, which.rotations, which.normal, 100.0, magnetic=False
-    )
-    assert not (estimates(times, readings, other).faults >> list(Fault).index(Fault.INVALID)).any()
-
-
-def test_a_sensor_of_one_taxel_has_no_field():
-    which = sensor("anyskin")
-    one = type(which)("one", which.positions[:1], which.rotations[:1], which.normal, 100.0)
-    lone = type(one)("one", one.positions, one.rotations, one.normal, 100.0, magnetic=True)
-    times, readings, _ = still_hold()
-    alone = [estimates(times, readings[:, :1], each) for each in (one, lone)]
-    assert (alone[0].state == alone[1].state).all()
 
 
 def test_the_tare_takes_no_invalid_reading():

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from holdfast.contact import ContactState, Fault, Reason, taxels_of
+from holdfast.contact import ContactState, Fault, Reason
 from holdfast.detection import Detector, Model, detect
 from holdfast.metrics.masks import runs as stretches_of
 from holdfast.recordings import Recording, Tactile
 from holdfast.twin.simulation import Grasp, simulate
 
-from .build import RATE, feed, model, runs, sensor
+from .build import RATE, feed, model, sensor
 
 NO_CONTACT, STABLE, UNKNOWN = (
     state.code for state in (ContactState.NO_CONTACT, ContactState.STABLE, ContactState.UNKNOWN)
@@ -190,13 +190,6 @@ class TestEstimates:
         )  # fmt: skip
         assert last.state is not ContactState.UNKNOWN
 
-    def test_a_finger_of_one_taxel_has_none_left(self):
-        values = noise(n_taxels=1)
-        values[300:310, 0, 0] = np.nan
-        found = self.estimates(values, sensor(1, "tip", limits=(0.0, LIMIT)))
-        assert {e.reason for e in found[300:310]} == {Reason.FAULT}
-        assert np.isnan([e.force for e in found[300:310]]).all()
-
     @pytest.mark.parametrize("tare", ["0.5", "first", "none"])
     def test_a_taxel_that_is_never_a_number(self, tare):
         values = noise()
@@ -207,53 +200,6 @@ class TestEstimates:
         assert {(e.faults, e.faulty_taxels) for e in found[wait:]} == {((Fault.NOT_FINITE,), (3,))}
         whole = self.estimates(np.delete(values, 3, axis=1), _without(TIP, 3), tare=tare)
         assert np.allclose(found[-1].force, whole[-1].force, atol=30.0)
-
-    def test_a_taxel_without_a_tare_stays_left_out(self):
-        values = noise()
-        values[:200, 3] = np.nan
-        values[200:, 3] += 5000.0
-        found = self.estimates(values)
-        assert {e.faulty_taxels for e in found} == {(3,)}
-        assert max(np.linalg.norm(e.force) for e in found[300:]) < 200.0
-
-    def test_windows_hold_no_noise_of_a_noisy_taxel_after_it_is_masked(self):
-        values = noise()
-        values[300:500, 3] += np.rint(np.random.default_rng(9).normal(scale=2000.0, size=(200, 3)))
-        found = self.estimates(values)
-        first = next(k for k, e in enumerate(found) if e.faults)
-        (reason, wait), (after, _) = runs(found[first:500], lambda e: str(e.reason))
-        assert (reason, after) == ("warm_up", "")
-        assert 5 <= wait <= 10  # the window, and until the mask is complete
-        assert max(e.instability for e in found[first + wait : 500]) < 20.0
-
-    def test_a_taxel_that_comes_back_at_once_moves_no_other(self):
-        tip = sensor(6, "tip", limits=(29_940.0, 30_060.0))
-        values = noise()
-        values[:, 1] = values[0, 1]  # dead
-        values[500, 0, 2] = 30_060.0
-        found = feed(Detector(model(("thumb",), which=tip, tare="none")), values)
-        assert [found[k].faulty_taxels for k in (499, 500, 501)] == [(1,), (0, 1), (1,)]
-        values[500, 0] = values[499, 0]  # what it counts for while it is masked
-        filled = []
-        for k in (500, 501):
-            healthy = sum(tip.rotations[i] @ values[k, i] for i in (0, 2, 3, 4, 5))
-            filled.append(np.array(found[k].force) - healthy)
-        np.testing.assert_allclose(filled[1], filled[0], atol=1e-6)
-
-    def test_one_by_one_equals_all_at_once(self):
-        values = noise()
-        press = 2000.0 * np.clip(np.arange(900) / RATE - 2.0, 0.0, 1.0)
-        values[:, :, 2] += np.rint(press)[:, None]
-        values[400:500, 1] = np.nan
-        values[450:700, 2] = LIMIT
-        values[600:, 5] = values[600, 5]
-        hand_model = model(("thumb",), which=TIP)
-        found = feed(Detector(hand_model), values)
-        recording = Recording("r", {"thumb": Tactile(TIP, np.arange(900) / RATE, values)})
-        trace = Detector.for_recording(hand_model, recording).run(recording).fingers["thumb"]
-        assert [tuple(e.force) for e in found[100:]] == list(map(tuple, trace.force[100:]))
-        assert [e.state.code for e in found] == trace.state.tolist()
-        assert [e.faulty_taxels for e in found] == [*map(taxels_of, trace.faulty_taxels)]
 
 
 def _without(which, taxel):

@@ -90,15 +90,6 @@ class TestTimes:
         assert arrival.time == math.nextafter(START + 3 * PERIOD, math.inf)
         assert list(arrival.samples) == ["finger1", "finger2"]
 
-    def test_a_device_twice_in_a_packet_arrives_twice(self):
-        made = assembler(1)
-        made.stamp(START, 50.0)
-        made.add(1, readings(1), START - 0.01)
-        made.add(1, readings(2), START)
-        arrivals = made.finish(50.0)
-        assert [a.time for a in arrivals] == [START - 0.01, START]
-        assert [a.samples["finger1"][0, 0] for a in arrivals] == [1, 2]
-
     def test_a_stamp_from_before_a_jump_is_replaced(self):
         made = assembler(1)
         (arrival,) = packet(made, 0, 1, own=START + 0.2)
@@ -142,25 +133,11 @@ class TestCounters:
     def test_missing_packets(self, last, sequence, n):
         assert n_missing(last, sequence) == n
 
-    def test_devices_have_counters_of_their_own(self):
-        made = assembler(1, 2)
-        given = [(1, 0), (2, 100), (1, 1), (2, 105), (1, None), (1, 9), (1, 11)]
-        assert [made.n_missing(k, number) for number, k in given] == [0, 0, 0, 4, 0, 0, 1]
-        made.reconnected()
-        assert made.n_missing(500, 1) == 0
-
     def test_repeated_samples(self):
         made = assembler(1, 2)
         given = [(1, 5.0), (1, 5.0), (2, 5.0), (1, None), (1, 5.0), (1, 6.0)]
         new = [made.is_new(number, identity) for number, identity in given]
         assert new == [True, False, True, True, False, True]
-
-    def test_counts_wait_for_an_arrival(self):
-        made = assembler(1)
-        made.n_lost += 3
-        assert made.finish(0.0) == []
-        (first,), (second,) = packet(made, 0, 1), packet(made, 1, 1)
-        assert (first.n_lost, second.n_lost) == (3, 0)
 
 
 class TestNotices:
@@ -173,13 +150,6 @@ class TestNotices:
             shown += [notice for arrival in made.finish(0.1 * k) for notice in arrival.notices]
         assert shown == ["a 0", "b 0", "a 10", "b 10", "a 20", "b 20"]
 
-    def test_old_topics_are_dropped(self):
-        made = assembler(1)
-        for k in range(10_000):
-            made.notify(f"{k}", "", 0.1 * k)
-            made.finish(0.1 * k)
-        assert len(made._noticed_at) < 20
-
     @pytest.mark.parametrize(("hold", "n_arrivals"), [(False, 25), (True, 3)])
     def test_refused_packets(self, hold, n_arrivals):
         made = assembler(1, hold_refusals=hold)
@@ -191,11 +161,3 @@ class TestNotices:
         assert all(math.isnan(arrival.time) for arrival in arrivals)
         (sample,) = packet(made, 0, 1)
         assert sum(arrival.n_refused for arrival in (*arrivals, sample)) == 25
-
-
-def test_a_fast_clock_gives_one_notice():
-    made, notices = assembler(1), []
-    for k in range(300):
-        arrivals = packet(made, k, 1, stamp=START + 1.5 * k * PERIOD)
-        notices += [text for one in arrivals for text in one.notices]
-    assert notices == ["the clock of the device runs 1.5 times as fast as that of this machine"]

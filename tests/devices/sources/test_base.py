@@ -17,7 +17,7 @@ class ScriptedDevice(DeviceSource):
 
     def __init__(self, clock, script, attempts=()):
         super().__init__()
-        self._clock = clock
+        self.clock = clock
         self._script = list(script)
         self._attempts = iter(attempts)
         self.attempted_at = []
@@ -25,13 +25,13 @@ class ScriptedDevice(DeviceSource):
 
     def open(self):
         self.close()
-        self.begin_reading(self._clock.now)
+        self.begin_reading(self.clock.now)
 
     def receive(self, timeout):
-        if not self._script or self._script[0][0] > self._clock.now + timeout:
-            self._clock.now += timeout
+        if not self._script or self._script[0][0] > self.clock.now + timeout:
+            self.clock.now += timeout
             return False
-        self._clock.now = max(self._clock.now, self._script[0][0])
+        self.clock.now = max(self.clock.now, self._script[0][0])
         at, arrivals = self._script.pop(0)
         if arrivals is None:
             self.lose("unplugged")
@@ -40,7 +40,7 @@ class ScriptedDevice(DeviceSource):
         return True
 
     def reconnect(self):
-        self.attempted_at.append(self._clock.now)
+        self.attempted_at.append(self.clock.now)
         return next(self._attempts, False)
 
     def disconnect(self):
@@ -60,10 +60,10 @@ def sample(at):
 
 def content(source, seconds):
     """Times by the host's clock of what a source gives: "sample" or the notices."""
-    end = source._clock.now + seconds
+    end = source.clock.now + seconds
     got = []
-    while source._clock.now < end:
-        arrival = source.read(min(0.25, end - source._clock.now))
+    while source.clock.now < end:
+        arrival = source.read(min(0.25, end - source.clock.now))
         if arrival is not None:
             got.append((round(arrival.received, 6), *(arrival.notices or ("sample",))))
     return got

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from devices.sources.reading import Clock
-from holdfast.detection import Detector, Model, detect
 from holdfast.devices.sources import open_source
 from holdfast.devices.sources import replay as module
 from holdfast.devices.sources.replay import ReplaySource
@@ -12,9 +11,6 @@ from holdfast.errors import RecordingError
 from holdfast.io import load_recording, save_recording
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.synthetic import synthetic_recording
-
-SUFFIXES = ("parquet", "mcap")
 
 
 @pytest.fixture
@@ -38,33 +34,6 @@ def hand(n=50, **fields):
 def path(tmp_path):
     save_recording(hand(), tmp_path / "grasp.parquet")
     return str(tmp_path / "grasp.parquet")
-
-
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_detector_fed_with_it_equals_detect(tmp_path, suffix):
-    """Offline detection is the detector fed with the recording."""
-    whole = synthetic_recording("grasp", 0, ("thumb", "index", "middle"))
-    thumb, index, middle = whole.modules.values()
-    own = Tactile(middle.sensor, middle.times[:-9] + 0.0021, middle.readings[:-9])
-    modules = {"thumb": thumb, "index": index.slice(5, 900), "middle": own}
-    recording = Recording("grasp", modules)
-    save_recording(recording, tmp_path / f"grasp.{suffix}")
-    model = Model.load("builtin:noise-floor")
-    expected = detect(model, recording)
-    detector = Detector.for_recording(model, recording)
-    n_seen = dict.fromkeys(modules, 0)
-    with ReplaySource(tmp_path / f"grasp.{suffix}", speed=0) as source:
-        for k, arrival in enumerate(source):
-            estimate = detector.update(arrival.samples, arrival.time)
-            assert arrival.time == expected.times[k]
-            assert estimate.state.code == expected.hand[k]
-            for name in arrival.samples:
-                want = expected.fingers[name].estimate(n_seen[name])
-                assert repr(estimate.fingers[name]) == repr(want)  # NaN is NaN
-                n_seen[name] += 1
-    assert n_seen == {name: len(trace) for name, trace in expected.fingers.items()}
-    assert k + 1 == len(expected.times)
-    assert len({tuple(trace.state) for trace in expected.fingers.values()}) > 1
 
 
 @pytest.mark.parametrize("speed", [0.5, 1.0, 20.0])
@@ -109,25 +78,6 @@ def test_a_timeout_that_is_too_short_gives_none_and_loses_nothing(path, clock):
     assert max(clock.slept) <= 0.0071
 
 
-def test_time_does_not_drift(path, clock, monkeypatch):
-    """Each sample is due by the beginning, not by the one before."""
-    clock.sleep = lambda seconds: setattr(clock, "now", clock.now + seconds + 1e-3)
-    with ReplaySource(path) as source:
-        arrivals = list(source)
-    late = [a.received - 100.0 - (a.time - 3.0) for a in arrivals]
-    assert max(late) < 2e-3
-
-
-def test_markers_become_notices(tmp_path):
-    save_recording(hand(markers=((3.1, "closed"),)), tmp_path / "a.mcap")
-    with ReplaySource(tmp_path / "a.mcap", speed=0) as source:
-        arrivals = list(source)
-    (k,) = [k for k, arrival in enumerate(arrivals) if arrival.notices]
-    assert (arrivals[k].notices, arrivals[k].samples) == (("marker: closed",), {})
-    assert np.isnan(arrivals[k].time)
-    assert arrivals[k - 1].time <= 3.1 < arrivals[k + 1].time
-
-
 @pytest.mark.parametrize("speed", [0.0, 10.0])
 def test_time_continues_in_a_loop(path, clock, speed):
     with ReplaySource(path, speed=speed, loop=True) as source:
@@ -144,13 +94,6 @@ def test_time_continues_in_a_loop(path, clock, speed):
     if speed:
         waited = got[224].received - got[0].received
         assert waited == pytest.approx((got[224].time - got[0].time) / speed)
-
-
-def test_metadata_are_those_of_the_recording_and_the_source(tmp_path):
-    save_recording(hand(metadata={"object": "can", "source": "twin"}), tmp_path / "a.parquet")
-    with ReplaySource(tmp_path / "a.parquet") as source:
-        assert source.metadata["recorded_from"] == "twin"
-        assert (source.metadata["object"], source.metadata["source"]) == ("can", source.name)
 
 
 def test_an_incomplete_recording_is_played_as_far_as_it_goes(tmp_path):

@@ -55,16 +55,6 @@ def test_values_are_exact(board):
     assert not any(arrival.notices or arrival.n_refused for arrival in arrivals)
 
 
-def test_samples_that_come_together_are_a_period_apart(board):
-    with started(board) as source:
-        time.sleep(0.2)
-        board.send(b"".join(map(packet, some(10))))
-        arrivals = some_of(source, 10)
-    assert len({arrival.received for arrival in arrivals}) == 1
-    assert np.diff([arrival.time for arrival in arrivals]) == pytest.approx(0.01)
-    assert arrivals[-1].time == arrivals[-1].received
-
-
 def test_a_board_may_carry_several_sensors(board):
     given = some(1, 10)
     with started(board, "?mags=10&fingers=2:thumb&baud=9600", n_mags=10) as source:

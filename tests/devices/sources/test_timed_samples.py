@@ -65,14 +65,6 @@ def test_modules_with_any_times(data):
     assert_same(timed_samples([recording]), recording)
 
 
-def test_a_module_that_stops_and_one_that_never_comes():
-    recording = hand()
-    thumb, index = recording.modules["thumb"], recording.modules["index"]
-    modules = {"thumb": thumb, "index": index.slice(0, 30), "ring": index.slice(0, 0)}
-    recording = replace(recording, modules=modules)
-    assert_same(timed_samples([recording]), recording)
-
-
 def test_markers_come_after_the_samples_of_their_time():
     markers = ((0.05, "closed"), (0.055, "two\nlines"), (0.05, "and held"))
     got = list(timed_samples([hand(20, markers=markers)]))

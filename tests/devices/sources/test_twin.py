@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holdfast.devices.sources import open_source, replay
+from holdfast.devices.sources import open_source
 from holdfast.devices.sources import twin as module
-from holdfast.devices.sources.twin import AskedTwin, Twin, grasp_of, write
+from holdfast.devices.sources.twin import AskedTwin, Twin, write
 from holdfast.devices.uri import parse
 from holdfast.io.stickers import picture_stamps
 from holdfast.recordings import Recording, Tactile
@@ -69,13 +69,6 @@ def test_samples_are_those_of_the_simulation(server):
         assert readings.dtype == one.readings.dtype
 
 
-def test_missing_parameters_have_defaults():
-    assert grasp_of(parse("twin:")[1]) == Grasp("can", 2, 1, "reference", 0)
-    text = "twin:?object=ball&case=1&repeat=7&profile=gentle&seed=9&server=true"
-    assert grasp_of(parse(text)[1]) == Grasp("ball", 1, 7, "gentle", 9, server=True)
-    assert grasp_of(parse("twin:?sensor=orca-finger")[1]).sensor == "orca-finger"
-
-
 def test_a_grasp_that_fails_is_tried_again(quick):
     quick(failing={(1, 0), (1, 1)})
     with open_source("twin:", speed=0) as source:
@@ -123,17 +116,6 @@ def test_a_restart_begins_the_next_grasp_unless_one_has_only_begun(quick, n_read
     assert [int(a.samples["thumb"][0, 0]) for a in arrivals[::10]] == then
 
 
-def test_a_restart_does_not_wait_long_for_the_next_grasp(quick, monkeypatch):
-    monkeypatch.setattr(replay, "RESTART_WAIT", 0.01)
-    with open_source("twin:?repeat=4", speed=1000.0, loop=True) as source:
-        list(itertools.islice(source, 5))
-        source._simulator.close()  # of the process that simulates the next grasp
-        source._simulator._process = subprocess.Popen(["sleep", "60"])
-        source.restart()
-        arrivals = list(itertools.islice(source, 10))
-    assert [int(a.samples["thumb"][0, 0]) for a in arrivals] == [40] * 10
-
-
 def test_the_next_grasp_is_simulated_by_another_process(monkeypatch):
     monkeypatch.setattr(module, "simulate", lambda _: short(ball()))
     with open_source(BALL, speed=0, loop=True) as source:
@@ -164,15 +146,6 @@ def test_it_waits_for_the_next_grasp(quick, monkeypatch):
         assert not source.ended
         process = source._simulator._process
     assert process.returncode is not None  # closing ended it
-
-
-def test_a_failed_process_is_replaced(quick):
-    with open_source("twin:", speed=0, loop=True) as source:
-        list(itertools.islice(source, 10))
-        source._simulator._process.wait()
-        source._simulator._path.unlink()
-        arrivals = list(itertools.islice(source, 10))
-    assert {int(a.samples["thumb"][0, 0]) for a in arrivals} == {20}
 
 
 def test_without_another_process_it_is_simulated_here(quick, monkeypatch):

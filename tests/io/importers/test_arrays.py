@@ -11,8 +11,6 @@ from holdfast.errors import MissingExtra, RecordingError
 from holdfast.io import import_recordings
 from holdfast.io.importers.arrays import arrays_of_hdf5
 from holdfast.io.importers.columns import Columns
-from holdfast.io.importers.reading import ForeignFile, recordings_of
-from holdfast.io.importers.stored import StoredArray, in_memory
 from holdfast.io.proposals import ProposalError
 from holdfast.sensors import sensor
 
@@ -322,22 +320,6 @@ def test_a_baseline_that_was_subtracted_leaves_out_the_range(tmp_path):
     assert modules["a"]["finger1"].sensor == skin
 
 
-def test_records_are_ordered_by_their_ids(tmp_path):
-    order = np.random.default_rng(0).permuted(np.tile(np.arange(5), (N, 1)), axis=1)
-    records = (
-        {"t": t, "p": [{"id": int(k), **dict(zip("xyz", x[k], strict=True))} for k in ids]}
-        for t, x, ids in zip(TIMES.tolist(), READINGS.tolist(), order, strict=True)
-    )
-    check(imported(lines(tmp_path / "a", records), {"*": SKIN}), ALONE)
-
-
-def test_each_array_keeps_its_own_times(tmp_path):
-    arrays = {"l/F": READINGS, "l/t": TIMES, "r/F": READINGS[30:], "r/t": TIMES[30:]}
-    modules = imported(hdf5(tmp_path / "a", arrays), dict.fromkeys(("l/F", "r/F"), SKIN))["a"]
-    assert modules["r"].times[0] == pytest.approx(0.3)
-    np.testing.assert_array_equal(modules["r"].readings, modules["l"].readings[30:])
-
-
 def external_link(content, other):
     import h5py
 
@@ -402,19 +384,3 @@ def test_only_the_last_line_of_json_may_be_cut(tmp_path):
     file.write_text(text.replace('"data"', '"data', 1))
     with pytest.raises(RecordingError, match="record 1"):
         imported(file, {"data": SKIN})
-
-
-def test_an_array_of_several_recordings_is_read_once(tmp_path):
-    reads = []
-
-    def values():
-        reads.append(1)
-        return np.random.default_rng(0).normal(size=(3, 80, 5, 3))
-
-    stored = StoredArray((3, 80, 5, 3), "f", values)
-    source = ForeignFile(
-        tmp_path / "set.h5", {"tactile": stored, "t": in_memory(np.arange(80) / 100)}
-    )
-    made = recordings_of(source, {"tactile": SKIN}, None, lambda _: None)
-    assert [recording.name for recording in made] == ["set-1", "set-2", "set-3"]
-    assert len(reads) == 1

@@ -118,23 +118,6 @@ def test_a_row_for_each_taxel_is_no_fast_sensor(tmp_path):
         imported(tmp_path / "a.csv", text)
 
 
-def test_stamps_without_digits_say_no_rate(tmp_path):
-    text = [",".join(HEAD), *rows(",", times=["1.76e9"] * N)]
-    with pytest.raises(RecordingError, match=r"digits are lost.*time=100Hz"):
-        imported(tmp_path / "a.csv", text)
-
-
-def test_one_stamp_that_steps_back_is_left_out(tmp_path):
-    times = np.arange(6 * N) / 100
-    times[100] = 0.5
-    lines = [",".join(["t,episode_index", *NAMES])]
-    lines += [f"{t:.3f},{k}," + ",".join(["1.5"] * 15) for k, t in enumerate(times)]
-    texts = []
-    (recording,) = imported(tmp_path / "a.csv", lines, report=texts.append)
-    assert recording.modules["finger1"].n_samples == 6 * N - 1
-    assert "step back" in texts[0]
-
-
 @pytest.mark.parametrize("with_column", [False, True])
 def test_times_that_restart_are_recordings(tmp_path, with_column):
     times = [f"{time:.3f}" for time in np.tile(np.arange(20) / 100, 3)]
@@ -203,45 +186,12 @@ def test_data_of_one_or_two_axes_have_an_answer(tmp_path, names):
         imported(tmp_path / "a.csv", text)
 
 
-def test_lines_before_the_header_are_left_out_and_said(tmp_path):
-    texts = []
-    text = ["##Session", "name,left", "cols,5", "##Data", *DIALECTS["comma"]]
-    check(imported(tmp_path / "a.csv", text, report=texts.append))
-    assert "4 lines before the header" in texts[0]
-
-
 def test_a_last_line_that_is_cut_is_left_out_and_said(tmp_path):
     texts = []
     check(imported(tmp_path / "a.csv", [*DIALECTS["comma"], "0.6,1.5"], report=texts.append))
     assert "the last row" in texts[0]
     with pytest.raises(RecordingError, match="row 62: 2 cells given, 16 expected"):
         imported(tmp_path / "a.csv", [*DIALECTS["comma"], "0.6,1.5", DIALECTS["comma"][-1]])
-
-
-def test_equal_names_are_refused(tmp_path):
-    text = [f"{line},{line.partition(',')[2]}" for line in DIALECTS["comma"]]
-    with pytest.raises(RecordingError, match=r"two columns are named 'Bx0 \[uT\]'"):
-        imported(tmp_path / "a.csv", text)
-
-
-@pytest.mark.parametrize("mark", [".", ","])
-def test_marks_between_thousands_need_the_option(tmp_path, mark):
-    values = np.rint(np.abs(READINGS) * 30)
-    cells = [[f"{value:,.0f}".replace(",", mark) for value in row] for row in values]
-    text = [";".join(HEAD), *(f"{k}0;" + ";".join(row) for k, row in enumerate(cells))]
-    words = {"columns": "time=Zeit [s]:ms"}
-    with pytest.raises(RecordingError, match="decimal=comma"):
-        imported(tmp_path / "a.csv", text, **words)
-    decimal = {".": "comma", ",": "point"}[mark]
-    words = {"columns": f"time=Zeit [s]:ms,decimal={decimal}"}
-    (recording,) = imported(tmp_path / "a.csv", text, **words)
-    np.testing.assert_array_equal(recording.modules["finger1"].readings.reshape(N, 15), values)
-
-
-def test_an_index_of_pandas_is_nothing(tmp_path):
-    text = [f"{k if k else ''},{line}" for k, line in enumerate(DIALECTS["comma"])]
-    check(imported(tmp_path / "a.csv", text))
-    check(imported(tmp_path / "a.csv", [f"index{text[0]}", *text[1:]]))
 
 
 def test_other_columns_that_fit_are_asked(tmp_path):

@@ -106,15 +106,6 @@ def test_a_cell_that_is_no_number_counts_where_its_column_is_read(tmp_path):
     assert len(list(import_recordings(path, sensors=one, columns=columns))) == 1
 
 
-def test_in_a_folder_the_file_that_differs_is_named(tmp_path):
-    for name in ("a.csv", "b.csv"):
-        write_flat(tmp_path / name, flat(time="time_s"), [0.0, 0.01])
-    path = tmp_path / "b.csv"
-    path.write_text(path.read_text().replace("t4_z", "other"))
-    with pytest.raises(RecordingError, match=r"b\.csv.*'t4_z' is missing"):
-        list(import_recordings(tmp_path, sensors=ANY))
-
-
 def test_columns_of_two_modules_with_sensors_of_their_own(tmp_path):
     names = [f"{m}_{k}_{a}" for m in ("left", "right") for k in range(5) for a in "xyz"]
     write(tmp_path / "a.csv", [], ["t", *names], [[k / 50, *range(30)] for k in range(3)])
@@ -155,24 +146,6 @@ def test_decimal_commas_beside_decimal_points(tmp_path, cells):
     (tmp_path / "a.csv").write_text("\n".join([flat(";"), *rows]))
     with pytest.raises(RecordingError, match=r"a\.csv, row 3: .*decimal=comma"):
         list(import_recordings(tmp_path / "a.csv", sensors=ANY))
-
-
-@pytest.mark.parametrize(
-    ("time", "stamps"),
-    [
-        ("time_ms", [0, 10, 20]),
-        ("time", [1_669_000_000_000_000_000 + 10_000_000 * k for k in range(3)]),
-        ("timestamp", [1_669_000_000.0, 1_669_000_000.01, 1_669_000_000.02]),
-        ("t (us)", [0, 10_000, 20_000]),
-        ("time_s", [0.0, 0.01, 0.02]),
-        ("milliseconds", [0.0, 10.0, 20.0]),
-    ],
-)
-def test_units_of_times(tmp_path, time, stamps):
-    write_flat(tmp_path / "a.csv", flat(time=time), stamps)
-    (recording,) = import_recordings(tmp_path / "a.csv", sensors=ANY)
-    times = recording.modules["finger1"].times
-    np.testing.assert_allclose(times - times[0], [0, 0.01, 0.02], atol=1e-6)
 
 
 def test_a_file_that_names_its_sensor_has_times_in_seconds(tmp_path):
@@ -244,10 +217,3 @@ def test_names_that_say_nothing_need_the_columns(tmp_path, header, name):
     module = recording.modules["finger1"]
     np.testing.assert_allclose(module.times, [0.0, 0.01, 0.02])
     assert module.readings[2].tolist() == np.arange(2, 17).reshape(5, 3).tolist()
-
-
-def test_a_folder_that_fails_has_the_reason_of_its_first_file(tmp_path):
-    for name in ("b.csv", "a.csv"):
-        write_numbers(tmp_path / name, PLAIN["no header"])
-    with pytest.raises(RecordingError, match=r"a\.csv: no columns are named"):
-        list(import_recordings(tmp_path))

@@ -90,11 +90,6 @@ class TestLongCells:
         assert table.values[:, 0].tolist() == [1, 2, 3]
         assert [len(cell) for cell in cells["note"]] == [n, 1, n]
 
-    def test_a_long_name_of_a_column(self, tmp_path):
-        path = tmp_path / "a.csv"
-        path.write_text(f"a,{'b' * 200_000}\n1,2\n")
-        assert read_table(path)[0].values.tolist() == [[1, 2]]
-
     @pytest.mark.parametrize("cell", ["x" * 200_000, "9" * 140_000 + "a"])
     def test_a_long_cell_that_is_no_number(self, tmp_path, cell):
         path = tmp_path / "a.csv"
@@ -108,12 +103,6 @@ class TestLongCells:
         path.write_text(f"a,note\n1,{'x' * ((1 << 20) + 1)}\n")
         with pytest.raises(RecordingError, match=r"a\.csv.* 10485\d\d"):
             read_table(path, text)
-
-    def test_a_header_that_is_too_long(self, tmp_path):
-        path = tmp_path / "a.csv"
-        path.write_text(f"{'a,' * (1 << 19)}b\n")
-        with pytest.raises(RecordingError, match="1048576"):
-            read_table(path)
 
     def test_the_limit_of_other_programs_stays(self, tmp_path):
         before = csv.field_size_limit()

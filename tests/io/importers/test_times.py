@@ -14,7 +14,6 @@ from holdfast.io.importers.times import (
     smoothest,
     stated_unit,
     times_of,
-    true_rate,
 )
 
 WORDS = {"ms": "ms", "min": "minutes", "d": "days", "us": "us", "ns": "ns", "h": "h", "s": "sec"}
@@ -68,12 +67,6 @@ def test_a_stamp_that_steps_back_is_no_restart():
     assert restarts(times) == []
     assert np.flatnonzero(~increasing(times)).tolist() == [50]
     assert restarts(np.tile(np.arange(20) / 100, 3)) == [20, 40]
-
-
-def test_the_rate_of_stamps_that_stand_still_or_are_set_back():
-    assert true_rate(np.floor(np.arange(300) / 3) * 0.03) == pytest.approx(100, rel=0.01)
-    assert true_rate(np.arange(300) / 100 - 0.3 * (np.arange(300) > 150)) == 100
-    assert true_rate(np.full(300, 1.76e9)) is None
 
 
 def test_a_cell_that_is_no_time():

@@ -1,5 +1,3 @@
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -54,15 +52,6 @@ def test_the_final_drop_of_the_force():
     assert times[final_drop(hand)] == pytest.approx(RELEASE, abs=0.05)
 
 
-@pytest.mark.parametrize("rises", [True, False])
-def test_a_force_that_rises_again_or_is_constant_has_no_final_drop(rises):
-    times = clock()
-    held = np.where(rises & (times >= 5) & (times <= 6), 0.0, GRIP)[:, None] * [0, 0, 1.0]
-    assert (
-        final_drop(hand_force(Recording("held", {"thumb": module(times, held)}), "first")) is None
-    )
-
-
 def test_the_centre_of_pressure_is_where_it_is_pressed():
     times = clock()
     load = GRIP * profile(times, 0.0)[:, 2]
@@ -74,13 +63,6 @@ def test_the_centre_of_pressure_is_where_it_is_pressed():
     assert centre[400] == pytest.approx(PATCH.positions[5])
     assert centre[800] == pytest.approx(PATCH.positions[10])
     assert np.isfinite(centre).all()
-
-
-def test_an_empty_module_is_left_out():
-    recording = grasp()
-    empty = replace(recording.modules["index"], times=np.zeros(0), readings=np.zeros((0, 16, 3)))
-    hand = hand_force(Recording("empty", {**recording.modules, "index": empty}))
-    assert list(hand.fingers) == ["thumb"]
 
 
 @pytest.mark.parametrize("n", [1, 2, 7, 38, 300])

@@ -47,13 +47,6 @@ def test_a_file_of_many_bodies(tmp_path):
     assert list(tip_tracks_of(poses, ["index", "thumb"])) == ["thumb"]
 
 
-def test_rows_out_of_order_and_twice(tmp_path):
-    lines = [ROW.format(t=t, x=x) for t, x in [(0.2, 2), (0.0, 0), (0.1, 1), (0.1, 9)]]
-    track = poses_from_csv(written(tmp_path, lines)).object_track
-    assert track.times.tolist() == [0, 0.1, 0.2]
-    assert track.positions[:, 0].tolist() == [0, 1, 2]
-
-
 def test_a_quaternion_is_brought_to_unit_length(tmp_path):
     lines = ["0,0,0,0,1.02,0,0,0", "1,0,0,0,0,0,0,0", "2,1,0,0,nan,0,0,0", "3,2,0,0,1,0,0,0"]
     track = poses_from_csv(written(tmp_path, lines)).object_track

@@ -14,7 +14,6 @@ from holdfast.recordings import Recording, label_states
 
 from .build import (
     CLOSING,
-    DURATION,
     FREE,
     GRIP,
     NOISE,
@@ -22,7 +21,6 @@ from .build import (
     PUSH,
     PUSHED,
     RELEASE,
-    SPANS,
     check,
     clock,
     drawn,
@@ -82,13 +80,6 @@ def test_another_unit_of_force_changes_nothing(power):
     assert drawn(signal.propose(grasp(scale=2.0**power))["thumb"]) == here
 
 
-def test_labels_and_truth_are_ignored():
-    recording = grasp()
-    blind = Recording("another", {n: replace(m, labels=()) for n, m in recording.modules.items()})
-    labelled = recording.with_labels({"thumb": signal.propose(recording)["index"]})
-    assert signal.propose(labelled) == signal.propose(blind)
-
-
 def test_a_disturbance_of_two_fingers_applies_to_all_one_of_a_finger_to_it_alone():
     times = clock()
     codes = label_states(pushed((0.2, 0.2, 0.0))["ring"], times)
@@ -96,31 +87,6 @@ def test_a_disturbance_of_two_fingers_applies_to_all_one_of_a_finger_to_it_alone
     labels = pushed((0.2, 0.0))
     check(labels["thumb"], EDGE)
     assert Cause.DISTURBANCE not in [label.cause for label in labels["index"]]
-
-
-def test_a_stronger_push_has_more_confidence():
-    def surety(push):
-        labels = signal.propose(grasp(push=push))["thumb"]
-        return next(x.confidence for x in labels if x.cause is Cause.DISTURBANCE)
-
-    assert surety(0.02) < surety(0.05) < surety(0.5)
-
-
-@pytest.mark.parametrize("kind", ["creep", "drift"])
-def test_creep_and_a_drifting_baseline_are_no_contact(kind):
-    times = clock()
-    creep = 0.05 * np.exp(-(times - FREE) / 2) * (times > FREE)
-    force = profile(times)
-    force[:, 2] += creep if kind == "creep" else 0.01 * times / DURATION
-    check(of_thumb(force), EDGE)
-
-
-def test_two_grasps_are_two():
-    times = clock()
-    twice = np.concatenate([profile(times)] * 2)
-    states = [state for state, _, _ in SPANS]
-    labels = of_thumb(twice, np.concatenate([times, times + DURATION]))
-    assert [label.state.value for label in labels] == [*states, *states[1:]]
 
 
 def test_a_grasp_that_never_settles_is_closing_to_its_end():

@@ -48,17 +48,6 @@ def test_a_fall_by_creep_or_drift_is_no_load(fall):
     assert evidence_of_contact(Recording("creep", {"thumb": module(times, force)})) == ""
 
 
-def test_a_short_dip_and_a_start_without_noise_show_no_load():
-    times = clock()
-    dip = GRIP * ((times < 5) | (times > 5.2))[:, None] * [0.0, 0.0, 1.0]
-    assert evidence_of_contact(Recording("dip", {"thumb": module(times, dip)})) == ""
-    thumb = held().modules["thumb"]
-    readings = thumb.readings.copy()
-    readings[:100] = readings[0]
-    still = Recording("still", {"thumb": replace(thumb, readings=readings)})
-    assert evidence_of_contact(still) == ""
-
-
 def test_a_module_without_finite_samples_shows_nothing():
     thumb = held().modules["thumb"]
     dead = replace(thumb, readings=np.full_like(thumb.readings, np.nan))

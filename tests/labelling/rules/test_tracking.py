@@ -1,11 +1,8 @@
 import re
 from dataclasses import replace
 
-import hypothesis.strategies as st
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from scipy.spatial.transform import Rotation
 
 from holdfast.contact import Cause
 from holdfast.errors import RecordingError
@@ -17,17 +14,14 @@ from holdfast.recordings import Recording, Truth, label_states
 
 from .build import (
     CLOSING,
-    DURATION,
     LOCKED,
     PUSH,
     PUSHED,
     RELEASE,
     check,
     clock,
-    drawn,
     grasp,
     module,
-    moved,
     poses,
     slide,
     tracked,
@@ -67,15 +61,6 @@ def test_a_slip_is_an_interval_of_its_own_within_the_disturbance():
     assert all("poses: truth" in label.evidence for label in labels)
 
 
-def test_two_slips_in_one_disturbance_are_two():
-    times = clock()
-    moves = ((CLOSING, LOCKED), (PUSH, PUSH + 0.2), (PUSH + 0.4, PUSHED), (RELEASE, 9.5))
-    labels = tracking.propose(tracked(poses(times, slide(times, moves))))["thumb"]
-    check(labels, EDGE)
-    slips = slips_of(labels)
-    assert np.ravel(slips) == pytest.approx([PUSH, PUSH + 0.2, PUSH + 0.4, PUSHED], abs=0.02)
-
-
 def test_displacement_has_a_slip_only_while_the_object_moves():
     times = clock()
     away = slide(times, ((PUSH, PUSH + 0.3),), speed=0.03)
@@ -86,19 +71,6 @@ def test_displacement_has_a_slip_only_while_the_object_moves():
     assert (end, back) == (pytest.approx(PUSH + 0.3, abs=0.02), pytest.approx(PUSH + 1.3, abs=0.02))
     still = next(label for label in labels["thumb"] if label.start == end)
     assert (still.state.value, still.cause) == ("UNSTABLE", None)
-
-
-@given(rotation=st.integers(0, 2**31), shift=st.floats(-5, 5))
-@settings(max_examples=5)
-def test_another_frame_of_the_world_changes_nothing(rotation, shift):
-    turn = Rotation.random(rng=rotation)
-    times = clock()
-    tip = poses(times, 0 * times)
-    here = tracked(poses(times, slide(times, MOVES)), tip)
-    there = tracked(moved(poses(times, slide(times, MOVES)), turn, shift), moved(tip, turn, shift))
-    a, b = tracking.propose(here)["thumb"], tracking.propose(there)["thumb"]
-    assert [row[0] for row in drawn(a)] == [row[0] for row in drawn(b)]
-    assert [row[1] for row in drawn(a)] == pytest.approx([row[1] for row in drawn(b)], abs=0.011)
 
 
 def carried():
@@ -131,14 +103,6 @@ def test_another_start_of_the_clock_moves_the_labels():
     check(tracking.propose(sliding(start=1e5))["thumb"], EDGE, start=1e5)
 
 
-@pytest.mark.parametrize(("speed", "jitter"), [(0.0005, 0.0), (0.0, 0.0003)])
-def test_motion_below_the_threshold_and_jitter_are_stable(speed, jitter):
-    times = clock()
-    crawl = poses(times, slide(times, ((0, DURATION),), speed=speed), jitter=jitter)
-    states = {label.state.value for label in tracking.propose(tracked(crawl))["thumb"]}
-    assert states == {"NO_CONTACT", "STABLE"}
-
-
 def test_a_gap_in_the_poses_is_bridged_or_has_no_label():
     times = clock()
     thing = poses(times, slide(times, MOVES))
@@ -157,14 +121,6 @@ def test_a_lost_object_is_out_of_sight_while_the_force_ends():
     *_, last, gone = tracking.propose(tracked(thing))["thumb"]
     assert (last.state, last.cause) == ("UNSTABLE", Cause.LOST)
     assert (gone.state, gone.cause) == ("NO_CONTACT", Cause.LOST)
-
-
-def test_an_object_out_of_sight_in_a_steady_grip_has_no_label():
-    times = clock()
-    thing = poses(times, slide(times, ((CLOSING, LOCKED),)))
-    thing[(times > 4) & (times < 8)] = np.nan
-    codes = label_states(tracking.propose(tracked(thing))["thumb"], times)
-    assert (codes[(times > 4.1) & (times < 7.9)] == 0).all()
 
 
 def test_a_frozen_marker_is_neither_motion_nor_rest():
@@ -200,12 +156,6 @@ def test_unreliable_clocks_halve_the_confidence():
     free = {n: module(times, np.zeros((len(times), 3)), k) for k, n in enumerate(["thumb"])}
     (label,) = tracking.propose(Recording("nothing", free), tracking=other)["thumb"]
     assert label.confidence <= 0.5
-
-
-def test_labels_of_the_recording_are_ignored():
-    recording = sliding()
-    labels = tracking.propose(recording)
-    assert tracking.propose(recording.with_labels(labels)) == labels
 
 
 def test_a_finger_without_poses_has_no_labels():

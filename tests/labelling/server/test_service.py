@@ -1,6 +1,5 @@
 import asyncio
 from contextlib import asynccontextmanager
-from dataclasses import replace
 
 import msgspec
 import pytest
@@ -140,19 +139,6 @@ def test_the_last_sample_of_every_finger_can_be_labelled(tmp_path):
         assert (module.label_states == ContactState.STABLE.code).all()
 
 
-def test_the_first_save_keeps_labels_inside(tmp_path):
-    path = made(tmp_path, bare=False)
-    _, reply = ask([path], OPEN)[0]
-    assert reply["origin"] == "inside"
-    assert reply["labels"]["thumb"]
-    body = {name: reply[name] for name in ("labels", "note", "author", "revision")}
-    ask([path], ("PUT", "/api/v1/recordings/0/labels", body))
-    assert load_recording(path).modules["thumb"].labels == tuple(
-        replace(label, author=label.author or "ada")
-        for label in load_recording(path, labels=False).modules["thumb"].labels
-    )
-
-
 def test_two_pages_on_one_file(tmp_path):
     path = made(tmp_path)
     first, second, reply = ask([path], labels(HELD), labels(SLIP), OPEN)
@@ -222,18 +208,6 @@ def test_a_file_that_may_only_be_read(tmp_path):
     (_, reply), saved = ask([path], OPEN, labels())
     assert reply["read_only"] is True
     assert saved[0] == 403
-
-
-def test_a_failed_write(tmp_path, monkeypatch):
-    path = made(tmp_path)
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("pathlib.Path.write_bytes", full)
-    ((status, reply),) = ask([path], labels(HELD))
-    assert status == 500
-    assert reply["error"].endswith("No space left on device")
 
 
 def test_proposals_are_made_kept_and_counted(tmp_path):

@@ -58,19 +58,6 @@ def test_minima_and_maxima_of_neighbours(points, start, end):
             assert (np.nanmax(values_of(series), axis=0) >= np.nanmax(every, axis=0)).all()
 
 
-def test_pairs_hold_every_sample_between_them():
-    part = signals_of(RECORDING).part(points=100).fingers["thumb"]
-    exact = signals_of(RECORDING).part(points=N).fingers["thumb"]
-    begins = np.array(part["t"][::2])
-    bins = np.searchsorted(begins, exact["t"], side="right") - 1
-    first, second = np.array(part["F_x"][::2]), np.array(part["F_x"][1::2])
-    values = np.array(exact["F_x"])
-    for k in range(len(begins)):
-        own = values[bins == k]
-        indices = sorted([own.argmin(), own.argmax()])
-        assert [first[k], second[k]] == own[indices].tolist()
-
-
 @pytest.mark.parametrize("points", [3, 50, 100, 400])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_falls_is_drawn_falling_and_what_rises_rising(points, sign):
@@ -84,29 +71,6 @@ def test_what_falls_is_drawn_falling_and_what_rises_rising(points, sign):
     assert not part.exact
     moves = sign * np.diff(part.fingers["thumb"]["F_a"])
     assert moves.max() <= 0 and moves.min() < -1000
-
-
-def test_a_slope_stays_straight():
-    times = np.arange(4096) / 150
-    readings = np.zeros((4096, 16, 3))
-    readings[..., 2] = np.linspace(1000, 0, 4096)[:, None]
-    slope = Recording("slope", {"thumb": Tactile(sensor("uskin-4x4"), times, readings)})
-    series = signals_of(slope, "none").part(points=100).fingers["thumb"]
-    np.testing.assert_allclose(
-        series["F_a"], np.interp(series["t"], times, 16 * readings[:, 0, 2]), rtol=1e-5
-    )
-
-
-@pytest.mark.parametrize("points", [10, 100, 400])
-def test_unknown_values_do_not_change_the_order(points):
-    times, values = np.arange(3000) / 150, np.linspace(9000, 100, 3000)
-    readings = np.zeros((3000, 16, 3))
-    readings[..., 2] = values[:, None]
-    readings[np.random.default_rng(0).random(3000) < 0.5] = np.nan
-    module = Tactile(sensor("uskin-4x4"), times, readings)
-    series = signals_of(Recording("holes", {"thumb": module}), "none").part(points=points)
-    drawn = values_of(series.fingers["thumb"])[:, 0]
-    assert (np.diff(drawn[np.isfinite(drawn)]) <= 0).all()
 
 
 def test_parts_have_a_sample_on_either_side():
@@ -206,13 +170,6 @@ def test_a_steady_force_has_none():
     assert len(change_points(times, force_of(np.full(9000, 50.0), 1.0), PERIOD)) <= 3
     assert len(change_points(times, force_of(np.full(9000, 50.0)), PERIOD)) == 0
     assert len(change_points(times, force_of(np.zeros(9000)), PERIOD)) == 0
-
-
-def test_a_change_of_scale_changes_nothing():
-    times, amplitude = grasp()
-    force = force_of(amplitude, 0.5)
-    one, other = (change_points(times, k * force, PERIOD) for k in (1.0, 1e-3))
-    np.testing.assert_array_equal(one, other)
 
 
 def test_unknown_forces_are_left_out():

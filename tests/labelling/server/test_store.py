@@ -1,16 +1,14 @@
 import json
 import time
-import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from holdfast.contact import Cause, ContactState
 from holdfast.errors import OutputError, RecordingError
-from holdfast.io import labels_path, load_labels, load_recording, save_labels
+from holdfast.io import labels_path, load_labels, load_recording
 from holdfast.io.label_files import label_bytes
 from holdfast.labelling.server import store
 from holdfast.labelling.server.store import (
@@ -27,7 +25,6 @@ from holdfast.labelling.server.store import (
 )
 from holdfast.recordings import Label, Recording, Tactile
 from holdfast.sensors import sensor
-from holdfast.synthetic import synthetic_recording
 from traps import traps
 
 from .build import NOW, made
@@ -68,15 +65,6 @@ def test_saved_labels_are_read_back(labelled):
     assert load_labels(labels_path(path)).time == NOW
 
 
-def test_the_file_is_as_save_labels_writes_it(bare):
-    recording, path = bare
-    save(bare, {"thumb": [replace(HELD, author="ada")]})
-    own = labels_path(path).read_bytes()
-    labelled = recording.with_labels({"thumb": [replace(HELD, author="ada")]})
-    save_labels(labelled, path, author="ada", time=NOW, notes="nice", force=True)
-    assert labels_path(path).read_bytes() == own
-
-
 def test_labels_inside_and_none(labelled, bare):
     recording, path = labelled
     inside = read_stored(path, recording)
@@ -104,19 +92,6 @@ def test_saving_the_same_again_changes_no_revision(bare):
     first = save(bare, {"thumb": [HELD]})
     assert save(bare, {"thumb": [HELD]}, first.revision) == first
     assert save(bare, {"thumb": [HELD]}, first.revision, note="other").revision != first.revision
-
-
-def test_a_label_file_of_another_recording(bare):
-    recording, path = bare
-    other = synthetic_recording("other", 1, ("thumb", "index"))
-    save_labels(other, path)
-    before = labels_path(path).read_bytes()
-    text = r"bare\.labels\.json labels another recording \('other'"
-    with pytest.raises(RecordingError, match=text):
-        read_stored(path, recording)
-    with pytest.raises(RecordingError, match=text):
-        save(bare, {"thumb": [HELD]}, revision_of(label_bytes(path)))
-    assert labels_path(path).read_bytes() == before
 
 
 @traps
@@ -212,18 +187,6 @@ def test_a_read_only_file(bare):
     assert read_stored(path, recording) == first
 
 
-def test_a_read_only_folder(bare):
-    _, path = bare
-    path.parent.chmod(0o555)
-    try:
-        assert is_read_only(path)
-        with pytest.raises(ReadOnlyError):
-            save(bare, {"thumb": [HELD]})
-    finally:
-        path.parent.chmod(0o755)
-    assert not labels_path(path).exists()
-
-
 def test_a_failed_write_leaves_the_old_file(bare, monkeypatch):
     recording, path = bare
     first = save(bare, {"thumb": [HELD]})
@@ -298,20 +261,3 @@ def test_labels_outside_the_recording_are_not_cut_but_refused(given):
     assert found == {"index": (label,)}
     with pytest.raises(ValueError, match=r"^index: label .* lies outside the recording"):
         validated(uneven(), found)
-
-
-def test_memory_of_many_labels(bare):
-    """A label that is saved takes less than 900 bytes, in all its forms together."""
-    recording, path = bare
-    edges = np.linspace(recording.start, recording.end, 20_001).tolist()
-    inputs = {"thumb": [LabelInput(*span, "stable") for span in pairwise(edges)]}
-    revision = "none"
-    for _ in range(2):
-        tracemalloc.start()
-        labels = cut_to_samples(recording, parse_labels(inputs))
-        revision = save_stored(
-            path, recording, labels, revision=revision, author="ada", time=NOW
-        ).revision
-        _, peak = tracemalloc.get_traced_memory()
-        tracemalloc.stop()
-        assert peak < 900 * 20_000

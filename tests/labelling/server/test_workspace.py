@@ -1,6 +1,5 @@
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from threading import Event, Thread
+from threading import Thread
 
 import msgspec
 import numpy as np
@@ -70,29 +69,6 @@ def test_threads_share_what_is_computed_once(tmp_path, monkeypatch):
     assert len(made_of) == len(kept.open(0).recording.modules)
 
 
-def test_signals_do_not_wait_for_change_points(tmp_path, monkeypatch):
-    kept, begun, go_on = workspace_of(made(tmp_path, "one")), Event(), Event()
-    n_asked = []
-
-    def slow(times, *_):
-        n_asked.append(len(times))
-        begun.set()
-        assert go_on.wait(60)
-        return times[:1]
-
-    monkeypatch.setattr(workspace, "change_points", slow)
-    with ThreadPoolExecutor(3) as pool:
-        try:
-            asked = [pool.submit(kept.changes, 0) for _ in range(2)]
-            assert begun.wait(60)
-            assert pool.submit(kept.signals, 0).result(60).part().fingers
-            assert not any(each.done() for each in asked)
-        finally:
-            go_on.set()
-        assert [each.result(60) for each in asked] == [{name: [0.0] for name in FINGERS}] * 2
-    assert len(n_asked) == len(FINGERS)  # computed once
-
-
 def test_a_page_may_use_another_tare_than_the_workspace(tmp_path):
     path = made(tmp_path, "one")
     held = workspace_of(path, tare="first")
@@ -128,16 +104,6 @@ def test_files_beside_a_recording(tmp_path, name):
     found = beside(tmp_path / "one.parquet", name)
     assert found is not None
     assert found.read_bytes() == b"video"
-
-
-@pytest.mark.parametrize(
-    "name", ["", ".", "sub", "gone.mp4", "../other.mp4", "/etc/passwd", "a\0b", "x" * 5000, "~/a"]
-)
-def test_files_that_are_not_beside_it(tmp_path, name):
-    folder = tmp_path / "folder"
-    (folder / "sub").mkdir(parents=True)
-    (tmp_path / "other.mp4").write_bytes(b"other")
-    assert beside(folder / "one.parquet", name) is None
 
 
 @pytest.fixture(params=["parquet", "mcap"])

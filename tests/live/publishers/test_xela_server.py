@@ -113,13 +113,6 @@ def test_a_client_receives_everything_in_order(version, sensors):
     assert (np.diff([a.time for a in arrivals]) > 0).all()
 
 
-def test_fingertips_inside_a_hand():
-    with played(Made(), whole_hand=True) as server, open_source(server.uri) as source:
-        assert list(source.sensors) == list(WHOLE)
-        assert "?" not in server.uri
-        assert set(TIPS) < set(taken(source, 1)[0].samples)
-
-
 class InTurn(Made):
     """Source whose modules have their samples one after the other, half a millisecond apart."""
 
@@ -298,27 +291,6 @@ def test_readings_that_are_not_counts_end_the_server():
     assert str(server.failure).startswith("thumb: ")
 
 
-@pytest.mark.parametrize(
-    ("host", "expected"),
-    [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "127.0.0.1"), ("::1", "[::1]"), ("::", "127.0.0.1")],
-)
-def test_the_uri_of_the_server(host, expected):
-    with Made({"thumb": TIPS["thumb"]}) as source:
-        server = XelaServer(source, host=host, port=5001)
-        assert server.uri == f"xela://{expected}:5001?fingers=1:thumb"
-        assert not server.ended
-
-
-def test_the_end_waits_for_slow_clients(monkeypatch):
-    behind = [1]
-    monkeypatch.setattr(module, "_unsent_bytes", lambda client: behind[0])
-    with played(Made(n=5), wait=True) as server, open_source(server.uri):
-        wait_for(lambda: server.n_packets == 5)
-        assert not server.wait(0.2)
-        behind[0] = 0
-        assert server.wait(PATIENCE)
-
-
 @pytest.mark.parametrize("limit", [0.1, 1e6])
 def test_the_end_waits_for_a_limited_time_and_closing_for_nobody(monkeypatch, limit):
     monkeypatch.setattr(module, "_unsent_bytes", lambda client: 1)
@@ -367,19 +339,3 @@ def test_each_client_receives_the_recording_from_its_beginning(sensors):
         with open_source(server.uri) as late:
             assert begins(taken(late, 10)[0])
         assert (made.n_restarts, server.failure) == (3, None)
-
-
-def test_each_grasp_is_stamped_when_it_is_sent(monkeypatch):
-    """The second grasp begins 0.7 s later than its times, as after a slow simulation."""
-    now = [1000.0]
-    monkeypatch.setattr(module.time, "time", lambda: now[0])
-    with Made() as source:
-        server = XelaServer(source)
-        stamps = []
-        for time_of_sample, at in ((3.0, 0.0), (3.1, 0.1), (3.2, 0.4), (4.2, 1.9), (4.3, 2.0)):
-            now[0] = 1000.0 + at
-            batch = module.SampleBatch(
-                samples_of(TIPS, 0), time_of_sample, dict.fromkeys(TIPS, time_of_sample)
-            )
-            stamps.append(json.loads(server._packet(batch))["time"] - 1000.0)
-    assert stamps == pytest.approx([0.0, 0.1, 0.2, 1.9, 2.0])

@@ -128,12 +128,6 @@ def test_each_check_can_pass_and_fail(case):
     assert (view.words, view.message) == ("GOOD" if passed else "NOT YET", message)
 
 
-def test_why_a_camera_saw_nothing_is_shown():
-    protocol = Feeder(PULL).grasp(*moved(4))
-    protocol.checked("x", 9.0, None, "x.mp4 shows no sticker of the object")
-    assert protocol.message == "x.mp4 shows no sticker of the object"
-
-
 def test_an_open_hand_is_checked_by_its_health():
     hand = Feeder(HEALTH)
     hand.until(Stage.CHECK)
@@ -208,13 +202,6 @@ def test_a_grasp_can_be_repeated_while_it_runs_and_the_protocol_be_stopped():
     hand.protocol.press("quit")
     assert (hand.protocol.stage, hand.protocol.stopped) == (Stage.OVER, True)
     assert hand.protocol.press("next") == []
-
-
-def test_while_a_grasp_is_checked_keys_wait():
-    protocol = Feeder(HOLD).grasp()
-    for key in ("next", "repeat", "skip"):
-        assert protocol.press(key) == []
-    assert (protocol.stage, protocol.results) == (Stage.CHECK, [])
 
 
 def test_a_protocol_goes_on_at_its_step():

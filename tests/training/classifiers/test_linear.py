@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from holdfast.detection import Linear
 from holdfast.errors import ModelError
-from holdfast.kernel._extension import MAX_DEVIATION
+from holdfast.training.head_fits import MAX_DEVIATION
 
 numbers = st.floats(-1e3, 1e3)
 positive = st.floats(1e-2, 1e3)
@@ -48,13 +48,6 @@ def test_nan_features_have_no_probability():
 def test_far_from_the_boundary_it_is_certain():
     rule = Linear((0.0,), (1.0,), ((1.0,),), (0.0,))
     assert rule.probability([[1e9], [-1e9]]).tolist() == [1.0, 0.0]
-
-
-@pytest.mark.parametrize("kind", [np.float32, np.int64])
-def test_features_of_any_type(kind):
-    rule = Linear((0.0, 1.0), (1.0, 2.0), ((1.0, -1.0),), (0.2,))
-    features = np.arange(8).reshape(4, 2)
-    assert np.array_equal(rule.probability(features.astype(kind)), rule.probability(features))
 
 
 @pytest.mark.parametrize("shape", [(4, 1), (4, 3), (2,), (1, 4, 2)])

@@ -4,15 +4,12 @@ import warnings
 
 import numpy as np
 import pytest
-from scipy.optimize import approx_fprime
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LogisticRegression
 
 from holdfast.training.classifiers.fitting import standardise
 from holdfast.training.classifiers.newton import (
     Solution,
-    _evaluate,
-    _evaluate_multinomial,
     fit_logistic,
     fit_multinomial,
 )
@@ -117,27 +114,6 @@ def test_a_prior_is_kept_by_a_strong_penalty_and_forgotten_by_a_weak_one():
     np.testing.assert_allclose(forgotten.weights, free.weights, atol=1e-4)
     assert prior.intercept == 4.0
     np.testing.assert_array_equal(prior.weights, [1.0, -2.0, 0.5, 3.0, 0.0])
-
-
-@pytest.mark.parametrize("n_classes", [2, 3])
-def test_gradient_and_hessian_are_those_of_finite_differences(n_classes):
-    features, stable = samples(n=50, d=3)
-    if n_classes == 2:
-        evaluate, size, given = _evaluate, 4, (features, stable, (0.3, 0.7))
-    else:
-        evaluate, size = _evaluate_multinomial, 12
-        given = (features, classes_of(features, 3), np.array([0.2, 0.3, 0.5]))
-    penalty, prior, at = np.abs(np.random.default_rng(1).normal(size=(3, size)))
-
-    def values(weights):
-        gradient, hessian = np.empty(size), np.empty((size, size))
-        objective = evaluate(*given, penalty, prior, weights, gradient, hessian)
-        return objective, gradient, hessian
-
-    slope = approx_fprime(at, lambda w: values(w)[0], 1e-7)
-    assert values(at)[1] == pytest.approx(slope, rel=1e-4, abs=1e-5)
-    bent = [approx_fprime(at, lambda w, j=j: values(w)[1][j], 1e-7) for j in range(size)]
-    assert values(at)[2] == pytest.approx(np.array(bent), rel=1e-4, abs=1e-4)
 
 
 def test_standardised_features_have_numpys_bits():

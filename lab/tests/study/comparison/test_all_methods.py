@@ -11,9 +11,9 @@ from holdfast_lab.study.comparison import (
 )
 from holdfast_lab.study.comparison.rows import correct_and_all
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort
-from holdfast_lab.study.methods import METHODS, RIVALS
+from holdfast_lab.study.methods import METHODS
 from holdfast_lab.study.plan import StudyPlan
-from study.example_recordings import corpora_of, recording_with_truth, results_of, rows_of
+from study.example_recordings import corpora_of, recording_with_truth, results_of
 
 pytestmark = pytest.mark.slow
 
@@ -74,59 +74,9 @@ def test_the_tables_can_be_laid_out(tables):
         assert to_markdown(table) and to_json(table)
 
 
-def test_differences_are_to_the_best_of_the_family_of_the_paper(results, tables):
-    """Fingers are compared with fingers of the paper's method, hands with its hands."""
-    for name, base in (("zhang", "metrics"), ("jl_global_logreg", "hand")):
-        for key in ("recording", "object", "others"):
-            (row,) = rows_of(
-                tables["methods"],
-                method=METHODS[name].title,
-                on=jobs.SPLIT_TITLES[key],
-                figure=sample_tables.ACCURACY_DIFFERENCE,
-            )
-            own = results[f"methods/{name}"][key].metrics
-            family = [results[f"methods/{each}"][key] for each in ("logreg", "logreg_unweighted")]
-            best = max((getattr(each, base) for each in family), key=accuracy)
-            assert correct_and_all(own).keys() == correct_and_all(best).keys()
-            assert row.ours == pytest.approx(accuracy(own) - accuracy(best))
-            low, high = row.interval
-            assert low <= row.ours <= high
-
-
 def accuracy(metrics):
     right, n = np.array(list(correct_and_all(metrics).values())).sum(axis=0)
     return 100 * right / n
-
-
-def test_false_alarms_add_up(tables):
-    for row in rows_of(tables["events"], figure="false alarms under stable label, per minute"):
-        keys = {key: row.keys[key] for key in ("on", "threshold", "a glitch is", "method")}
-        parts = [
-            rows_of(tables["events"], **keys, figure=figure)[0]
-            for figure in ("of a glitch", "other false alarms")
-        ]
-        assert row.ours == pytest.approx(sum(part.ours for part in parts))
-
-
-def test_ours_beside_the_strongest_baseline(results, tables):
-    table = tables["strongest"]
-    assert {row.keys["on"] for row in table.rows} == {"unseen objects"}
-    (ratio,) = rows_of(
-        table,
-        error="samples of fingers [%]",
-        **{"left out": "nothing", "baseline of": "the paper's family"},
-        figure="ratio of errors",
-    )
-    errors = {
-        name: 100 - accuracy(results[f"methods/{name}"]["others"].fingers)
-        for name in ("logreg", "logreg_unweighted", "holdfast")
-    }
-    best = min(("logreg", "logreg_unweighted"), key=lambda name: errors[name])
-    assert ratio.keys["baseline"] == METHODS[best].title
-    assert ratio.ours == pytest.approx(errors[best] / errors["holdfast"])
-    low, high = ratio.interval
-    assert low <= ratio.ours and (high is None or ratio.ours <= high)
-    assert {row.keys["baseline"] for row in table.rows} <= {METHODS[name].title for name in RIVALS}
 
 
 def test_the_figures_can_be_drawn(plan, results):

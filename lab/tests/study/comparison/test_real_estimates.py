@@ -1,6 +1,5 @@
 from dataclasses import replace
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -8,10 +7,8 @@ from holdfast.contact import STABLE, UNKNOWN, UNSTABLE, Cause, ContactState
 from holdfast.recordings import Label
 from holdfast.synthetic import synthetic_recording
 from holdfast_lab.study.comparison.real_estimates import (
-    MAX_REAL_FOLDS,
     load_fingers,
     method_estimates,
-    n_folds,
     recording_labels,
 )
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationJob, score_splits
@@ -72,17 +69,6 @@ def test_each_recording_has_the_estimates_of_a_fit_to_the_others(corpus):
             )
         np.testing.assert_array_equal(each.hand.states.array, decided.hand.states)
         assert (each.known.array == (decided.hand.states != UNKNOWN)).all()
-
-
-def test_whole_hand_methods_have_no_fingers(corpus):
-    found = method_estimates("jl_global_logreg", corpus, 0)
-    assert all(not each.fingers and each.known.array.any() for each in found)
-
-
-def test_there_is_a_fold_for_each_recording_up_to_a_limit(corpus):
-    assert n_folds(corpus) == 3
-    many = msgspec.structs.replace(corpus, recordings=tuple(map(str, range(99))))
-    assert n_folds(many) == MAX_REAL_FOLDS
 
 
 def test_only_fingers_of_both_classes_are_loaded(tmp_path):

@@ -12,7 +12,6 @@ from holdfast.synthetic import synthetic_recording
 from holdfast.training import Setting, compute_decisions, train
 from holdfast_lab.study.comparison import real_models
 from holdfast_lab.study.comparison.real_models import SHIPPED, model_estimates
-from holdfast_lab.study.comparison.real_recordings import MODELS
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import save_all
 
@@ -67,32 +66,6 @@ def test_adapted_to_all_others_is_what_train_gives(corpus, recordings):
         same(found[index], train(others, setting).model, recording)
 
 
-def test_adapted_to_one_takes_one_with_both_classes(corpus, recordings, monkeypatch):
-    given = []
-    known = real_models.train
-    monkeypatch.setattr(
-        real_models, "train", lambda some, setting: given.append(some) or known(some, setting)
-    )
-    model_estimates("adapted to one", corpus, 0)
-    names = [[each.name for each in some] for some in given]
-    assert all(len(some) == 1 for some in names)
-    assert {"r1"} in map(set, names) and {"r0"} in map(set, names) and ["r2"] not in names
-
-
-def test_from_nothing_has_the_features_of_the_model(corpus, monkeypatch):
-    settings = []
-    known = real_models.train
-    monkeypatch.setattr(
-        real_models, "train", lambda some, setting: settings.append(setting) or known(some, setting)
-    )
-    found = model_estimates("from nothing", corpus, 0)
-    shipped = Model.load(SHIPPED)
-    assert {setting.features for setting in settings} == {shipped.finger("finger1").stable.features}
-    assert {str(setting.tare) for setting in settings} == {shipped.tare}
-    assert {setting.init for setting in settings} == {None}
-    assert found != model_estimates("untouched", corpus, 0)
-
-
 def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypatch):
     def fail(*_):
         raise TrainingError("one class only")
@@ -104,23 +77,6 @@ def test_where_others_cannot_train_the_model_stays_as_it_ships(corpus, monkeypat
     for each in model_estimates("from nothing", corpus, 0):
         assert not each.known.array.any()
         assert np.isnan(each.fingers["finger1"].probability.array).all()
-
-
-def test_recordings_that_the_model_refuses_have_no_estimate(tmp_path):
-    """`builtin:any` is for 30 to 1000 Hz."""
-    slow = []
-    for seed in range(2):
-        recording = part(seed)
-        modules = {
-            name: replace(module, times=module.times[::10], readings=module.readings[::10],
-                          sensor=replace(module.sensor, rate=15.0))
-            for name, module in recording.modules.items()
-        }  # fmt: skip
-        slow.append(replace(recording, modules=modules))
-    corpus = scan_corpus("real", save_all(tmp_path / "real", slow), tare="first")
-    for making in MODELS:
-        for each in model_estimates(making, corpus, 0):
-            assert (each.hand.states.array == UNKNOWN).all() and not each.known.array.any()
 
 
 class TestHand:
@@ -136,13 +92,6 @@ class TestHand:
             self.finger([STABLE, STABLE, STABLE, STABLE], [0.8, 0.8, 0.8, 0.8]),
         ]
         assert real_models.smallest_probability(fingers).tolist() == [0.7, 0.1, 0.6, 0.5]
-
-    def test_without_enough_contacts_every_finger_keeps_its_score(self):
-        fingers = [
-            self.finger([NO_CONTACT, STABLE, NO_CONTACT, UNKNOWN], [0.3, 0.8, 0.2, np.nan]),
-            self.finger([NO_CONTACT, NO_CONTACT, STABLE, STABLE], [0.7, 0.1, 0.6, 0.5]),
-        ]
-        assert real_models.smallest_probability(fingers).tolist() == [0.3, 0.1, 0.2, 0.5]
 
     def test_a_decision_lasts_until_the_next(self):
         decided = FingerDecisions([0.01, 0.03], [0, 0], [STABLE, UNSTABLE], [0.9, 0.1])

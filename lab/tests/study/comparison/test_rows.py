@@ -5,16 +5,13 @@ import pytest
 
 from holdfast.metrics import Decisions, FingerDecisions, summarise
 from holdfast_lab.study.comparison.rows import (
-    calibration_row,
     correct_and_all,
     difference_row,
     quantile_row,
     quotient_row,
     ratio_row,
     sample_rows,
-    without_estimate_row,
 )
-from holdfast_lab.study.evaluation.evaluate_method import MethodEvaluation
 
 
 def metrics_of(*recordings):
@@ -51,12 +48,6 @@ def test_its_interval_draws_the_same_recordings_for_both():
     assert difference_row({}, first, first, seed=0).interval == (0.0, 0.0)
 
 
-def test_only_recordings_of_both_are_compared():
-    first, second = metrics_of(RIGHT, HALF), metrics_of(HALF)
-    row = difference_row({}, first, second, seed=0)
-    assert (row.ours, row.n, row.interval) == (50.0, 1, None)
-
-
 def test_ratios_leave_out_recordings_with_nothing():
     row = ratio_row({"figure": "x"}, [1, 0, 3], [2, 0, 4], seed=0)
     assert (row.ours, row.n) == (pytest.approx(400 / 6), 2)
@@ -81,16 +72,6 @@ def test_sample_rows_with_the_values_of_the_paper():
     assert rows[1].paper is None
 
 
-def test_the_calibration_error_by_hand():
-    """One bin is off by 0.1 on 30 samples, one by 0.2 on 10."""
-    table = [[0.0, 0.0, 0.0]] * 8 + [[24.0, 21.0, 30.0], [9.0, 7.0, 10.0]]
-    metrics = metrics_of(RIGHT)
-    evaluation = MethodEvaluation(None, metrics, [], [], [], [], [], [table])
-    assert calibration_row({}, evaluation, seed=0).ours == pytest.approx((3 + 2) / 40)
-    both = MethodEvaluation(None, metrics, [], [], [], [], [], [table, table])
-    assert calibration_row({}, both, seed=0).interval == pytest.approx((0.125, 0.125))
-
-
 def test_a_quotient_of_error_shares_is_paired():
     """Ours: 10 of 200 wrong, 5 %. The baseline: 30 of 200, 15 %. In each recording three times."""
     base, ours = np.array([[24, 100], [6, 100]]), np.array([[8, 100], [2, 100]])
@@ -98,18 +79,3 @@ def test_a_quotient_of_error_shares_is_paired():
     assert row.ours == pytest.approx(3.0)
     assert row.interval == (pytest.approx(3.0), pytest.approx(3.0))
     assert row.n == 2
-
-
-def test_a_quotient_without_errors_of_ours_is_infinite():
-    base, none = np.array([[3, 10], [4, 10]]), np.array([[0, 10], [0, 10]])
-    row = quotient_row({"figure": "ratio"}, base, none, seed=0)
-    assert (row.ours, row.interval) == (np.inf, (None, None))
-    assert quotient_row({"figure": "ratio"}, none, none, seed=0).ours is None
-    empty = quotient_row({"figure": "ratio"}, 0 * base, 0 * base, seed=0)
-    assert (empty.ours, empty.n, empty.interval) == (None, 0, None)
-
-
-def test_the_share_without_an_estimate():
-    row = without_estimate_row({"method": "one"}, [(100, 10), (300, 10)], seed=0)
-    assert row.keys == {"method": "one", "figure": "without estimate [%]"}
-    assert row.ours == pytest.approx(5.0)

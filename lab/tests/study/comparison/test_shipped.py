@@ -3,18 +3,9 @@ import math
 import pytest
 
 from holdfast_lab.study.comparison.shipped import (
-    NO_REPORT,
     ModelCounts,
     model_rows,
-    shipped_counts,
-    silenced,
-    speed_rows,
-    tables,
-    tasks,
-    taught_counts,
 )
-from holdfast_lab.study.plan import StudyPlan, scan_corpus
-from study.example_recordings import recording_with_truth, save_all
 
 COUNTS = ModelCounts(
     stable=(100, 90), unstable=(50, 40), events=(4, 1.0), alarms=(3, 2.0),
@@ -38,48 +29,3 @@ def test_the_figures_of_a_model_by_hand():
     assert found["false alarms of the hand, per minute"] == pytest.approx(1.5)
     assert found["false slips of a finger, per minute"] == pytest.approx(1.5)
     assert found["false slips of the hand, per minute"] == pytest.approx(3.0)
-
-
-def test_doing_nothing_finds_nothing_and_gives_no_alarm():
-    found = values(model_rows({}, [silenced(COUNTS)]))
-    assert found["stable called STABLE [%]"] == 100
-    assert found["events missed at 50 ms [%]"] == 100
-    assert found["slips"] == 4
-    rest = ("unstable or open, not STABLE [%]", "slips found within 0.1 s [%]",
-            "before 1 mm [%]",
-            "false alarms of the hand, per minute",
-            "false slips of the hand, per minute")  # fmt: skip
-    assert [found[name] for name in rest] == [0, 0, 0, 0, 0]
-
-
-def test_delays_by_the_speed_of_the_slip():
-    rows = {(r.keys["speed [mm/s]"], r.keys["figure"]): r.ours for r in speed_rows({}, [COUNTS])}
-    assert rows["0 to 2", "worst [s]"] == pytest.approx(-0.01)
-    assert rows["2 to 5", "slips"] == 2
-    assert rows["2 to 5", "worst [s]"] == math.inf
-    assert rows["2 to 5", "found within 0.1 s [%]"] == pytest.approx(50)
-    assert rows["over 18", "median [s]"] == pytest.approx(0.2)
-    assert rows["10 to 15", "slips"] == 0
-
-
-@pytest.mark.slow
-def test_the_tables_of_recordings(tmp_path):
-    def corpus(role, seeds):
-        made = [recording_with_truth(f"{role}-{seed}", seed) for seed in seeds]
-        return scan_corpus(role, save_all(tmp_path / role, made))
-
-    corpora = {"main": corpus("main", range(2)), "others": corpus("others", range(2, 4))}
-    corpora |= {role: corpus(role, range(4, 6)) for role in ("taught", "taught-pushes")}
-    plan = StudyPlan(corpora, full=True)
-    names = [task.name for task in tasks(plan)]
-    assert names[:3] == [f"shipped/builtin:{name}" for name in ("noise-floor", "any", "twin")]
-    assert names[3:] == [f"taught/{n}" for n in (2, 4, 8, 12)]
-    assert tasks(StudyPlan({"main": corpora["main"]})) == []
-    tests = {"others": corpora["others"]}
-    results = {name: shipped_counts(name.removeprefix("shipped/"), tests) for name in names[1:2]}
-    # The twin's fingers have other sensors than these recordings.
-    results["shipped/builtin:twin"] = results["shipped/builtin:any"]
-    results["taught/2"] = taught_counts(2, [corpora["taught"]], tests)
-    models, speeds = tables(plan, results)
-    assert {row.keys["model"] for row in models.rows} >= {"builtin:any", NO_REPORT}
-    assert all(row.keys["on"] == "unseen objects" for row in speeds.rows)

@@ -1,4 +1,3 @@
-import msgspec
 import pytest
 
 from holdfast.metrics.slip_curves import SlipIntervals, SlipSummary
@@ -73,20 +72,6 @@ def test_each_method_has_a_task_and_lines(quick, n):
     lines = {(row.keys["on"], row.keys["fitted to"], row.keys["method"]) for row in table.rows}
     assert len(lines) == 2 * n
     assert "| by object | 1/min held | true sliding | holdfast |" in to_markdown(table)
-
-
-def test_a_line_for_each_budget():
-    plan = StudyPlan({"main": corpus("main")}, quick=True)
-    quiet = SlipSummary({}, msgspec.structs.replace(METRICS, before_1mm=88.0))
-    both = msgspec.structs.replace(evaluation(), quiet_budget=quiet)
-    (table,) = tables(plan, {task.name: {"main": both} for task in tasks(plan)})
-    found = [
-        (row.keys["budget"], row.ours)
-        for row in table.rows
-        if row.keys["method"] == "AnySkin shear features"
-        and row.keys["figure"] == "before 1 mm [%]"
-    ]
-    assert found == [("1/min held", 61.0), ("1/min quiet", 88.0)]
 
 
 def test_methods_of_whole_hands_need_two_fingers():

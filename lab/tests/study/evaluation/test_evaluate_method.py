@@ -5,20 +5,15 @@ import numpy as np
 import pytest
 
 from holdfast.contact import UNKNOWN, ContactState
-from holdfast.metrics import event_metrics
 from holdfast.recordings import Label
 from holdfast_lab.study.evaluation.evaluate_method import (
-    OWN,
     EvaluationEffort,
     EvaluationJob,
     MethodEvaluation,
     evaluate_method,
-    evaluate_pooled,
     held_out_folds,
     score_splits,
-    warm_up,
 )
-from holdfast_lab.study.evaluation.recording_features import label_hand
 from holdfast_lab.study.plan import scan_corpus
 from study.example_recordings import recording_with_truth, save_all, save_synthetic
 
@@ -46,12 +41,6 @@ def test_every_recording_is_held_out_once(n, split):
     if split == "object":
         assert all(len({objects[index] for index in fold}) == 1 for fold in folds)
         assert len(folds) == min(3, n)
-
-
-def test_recordings_of_an_object_are_spread_over_the_folds():
-    objects = ["ball"] * 10 + ["box"] * 10
-    for fold in held_out_folds(objects, "recording", 5, seed=3):
-        assert [objects[index] for index in sorted(fold)] == ["ball"] * 2 + ["box"] * 2
 
 
 @pytest.mark.parametrize("objects", [["ball", "ball"], ["ball", None], [None, None]])
@@ -117,32 +106,11 @@ def test_a_job_has_a_result_for_each_split_and_each_corpus(evaluations, corpus):
     assert evaluations["recording"].fingers.pooled.accuracy > 75
 
 
-def test_events_are_counted_by_exact_labels(evaluations, corpus):
-    """Equal to `event_metrics` of the hand, by labels without margin."""
-    _, scored = next(score_splits(EvaluationJob("logreg", corpus, effort=EFFORT)))
-    for case, alarms in zip(scored, evaluations["recording"].alarms[OWN], strict=True):
-        labels = label_hand(case.recording.times, case.recording.exact_labels).labels
-        score = case.hand
-        known = event_metrics(score.times, labels, score.states())
-        assert len(alarms.delays) == known.n_events
-        assert alarms.n_under_stable == known.false_alarms["STABLE"]
-        assert alarms.n_false_alarms == sum(known.false_alarms.values())
-
-
 def test_a_whole_hand_method_has_no_fingers(corpus):
     found = evaluate_method(EvaluationJob("jl_global_logreg", corpus, effort=EFFORT))["recording"]
     assert found.fingers is None
     assert found.metrics is found.hand
     assert found.hand.pooled.brier is not None
-
-
-def test_a_random_split_evaluates_every_sample_once(corpus):
-    job = EvaluationJob("logreg", corpus, effort=EFFORT)
-    counts = np.array(evaluate_pooled(job))
-    honest = evaluate_method(job)["recording"].fingers
-    assert counts.shape == (6, 4)
-    assert counts.sum() == honest.pooled.n
-    assert evaluate_pooled(job) == counts.tolist()
 
 
 def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
@@ -163,11 +131,3 @@ def test_methods_are_scored_where_all_of_them_have_an_estimate(corpus):
     ):
         assert n == n_paper
         assert n_without < n_without_paper
-
-
-@pytest.mark.parametrize(
-    ("method", "samples"),
-    [("friction", 0), ("difference", 1), ("logreg", 13), ("spectrum", 29)],
-)
-def test_the_history_of_a_method_in_samples(method, samples):
-    assert warm_up(method, 150.0) == pytest.approx(samples / 150)

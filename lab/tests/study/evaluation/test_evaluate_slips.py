@@ -4,9 +4,7 @@ import pytest
 
 from holdfast.contact import UNKNOWN, UNSTABLE
 from holdfast.detection import Head
-from holdfast.metrics.slip_curves import SLIP_THRESHOLDS
-from holdfast.metrics.slip_truth import CREEPING, NOT_HELD, SLIDING, STILL, Slip, SlipTruth
-from holdfast.metrics.slips import SlipCounts
+from holdfast.metrics.slip_truth import CREEPING, SLIDING, STILL, Slip, SlipTruth
 from holdfast.training.head_fits import SLIP_SMOOTHING
 from holdfast_lab.study.evaluation import evaluate_slips as module
 from holdfast_lab.study.evaluation.evaluate_method import EvaluationEffort, EvaluationJob
@@ -14,12 +12,10 @@ from holdfast_lab.study.evaluation.evaluate_slips import (
     SlipEvaluation,
     SlipScores,
     evaluate_slips,
-    log_odds_of,
     slip_curves,
     smoothed,
     still_ranks,
 )
-from holdfast_lab.study.evaluation.fitted_method import MethodTraining, probability_of
 from holdfast_lab.study.evaluation.recording_features import corpus_features
 from holdfast_lab.study.methods import HAND, METHODS
 from holdfast_lab.study.plan import scan_corpus
@@ -53,30 +49,11 @@ def test_the_truth_is_that_of_each_finger(recordings):
     assert not truth["index"].quiet[inside([(5.4, 6.4)], times)].any()
 
 
-def test_slips_in_the_history_of_a_compared_method_are_left_out(corpus):
-    """A stretch begins after the tare of 0.5 s."""
-    (recording, _) = corpus_features(METHODS["difference"], corpus, warm_up=5.3)
-    times = recording.times["thumb"]
-    known = recording.slips["thumb"].codes != NOT_HELD
-    assert not known[times < 5.79].any() and known[(times > 5.81) & (times < 9)].all()
-    (slip,) = recording.slips["thumb"].slips
-    assert slip.onset == pytest.approx(SLIPS[1][0])
-
-
 def test_a_hand_slides_if_one_of_its_fingers_slides(recordings):
     labels = recordings[0].slip_labels(HAND)
     times = recordings[0].times["thumb"]
     np.testing.assert_array_equal(labels == UNSTABLE, inside(SLIPS, times))
     assert ((labels == UNKNOWN) == ~inside([(2.3, 9.5)], times)).all()
-
-
-def test_all_sliding_samples_train_and_still_ones_are_thinned(recordings):
-    training = MethodTraining.of(METHODS["difference"], recordings, 200, sliding=True)
-    thumb = training.samples["thumb"]
-    n_sliding = sum(int((r.slips["thumb"].codes == SLIDING).sum()) for r in recordings)
-    assert (~thumb.positive).sum() == n_sliding
-    assert 100 < thumb.positive.sum() <= 200
-    assert training.samples["index"].one_class
 
 
 def test_scores_are_smoothed_as_by_the_rule_of_a_model():
@@ -93,30 +70,6 @@ def test_scores_are_smoothed_as_by_the_rule_of_a_model():
 
 class _Smoothing:
     smoothing = SLIP_SMOOTHING
-
-
-class TestRanks:
-    ranks = np.sort(np.random.default_rng(1).normal(0, 1, 1000))
-
-    def test_a_higher_score_is_never_lower(self):
-        scores = np.linspace(-5, 5, 500)
-        assert (np.diff(log_odds_of(scores, self.ranks)) >= 0).all()
-
-    def test_the_thresholds_reach_from_every_still_sample_to_none(self):
-        probability = probability_of(log_odds_of(self.ranks, self.ranks))
-        assert (probability >= SLIP_THRESHOLDS[0]).all()
-        assert not (probability >= SLIP_THRESHOLDS[-1]).any()
-        above = probability_of(log_odds_of(self.ranks[-1:] + 0.1, self.ranks))
-        assert above >= SLIP_THRESHOLDS[-1]
-
-    def test_the_scale_of_the_scores_does_not_matter(self):
-        scores = np.linspace(-3, 3, 100)
-        np.testing.assert_allclose(
-            log_odds_of(scores, self.ranks), log_odds_of(10 * scores + 3, 10 * self.ranks + 3)
-        )
-
-    def test_no_estimate_stays_without(self):
-        assert np.isnan(log_odds_of(np.array([np.nan]), self.ranks)).all()
 
 
 def test_a_perfect_score_finds_every_slip_without_a_false_alarm():
@@ -185,24 +138,6 @@ def test_without_known_slips_there_are_no_results(tmp_path):
     corpus = scan_corpus("main", save_synthetic(tmp_path / "main", range(3)))
     for name in ("holdfast", "holdfast_stability"):
         assert evaluate_slips(job(name, corpus)) == {}
-
-
-def test_a_threshold_of_other_recordings_comes_from_training_alone(monkeypatch, corpora):
-    """What is tested does not change the choice."""
-    seen = []
-    summarise = module.summarise_choice
-
-    def noted(curves, *budget, training, **options):
-        seen.append([curve for fingers in training for curve in fingers.values()])
-        return summarise(curves, *budget, training=training, **options)
-
-    monkeypatch.setattr(module, "summarise_choice", noted)
-    evaluated(corpora, "holdfast")
-    of_others = [curves for curves in seen if curves]
-    assert len(of_others) == 2  # for each budget
-    for curve in map(SlipCounts.total, of_others):
-        held_seconds = 4 * (2 * 7.2 - 1.353)  # the thumb slips
-        assert curve[0].held_seconds == pytest.approx(held_seconds, rel=0.01)
 
 
 def test_each_budget_has_a_threshold_and_intervals_of_its_own(corpora, monkeypatch):

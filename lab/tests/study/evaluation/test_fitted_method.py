@@ -50,18 +50,6 @@ def test_the_state_of_a_hand_follows_from_its_fingers_at_any_threshold(seed):
         assert not np.isnan(score.probability[score.states(shift) != UNKNOWN]).any()
 
 
-def test_the_probability_of_a_hand_is_the_smallest_of_the_touching_fingers():
-    times = np.array([0.0, 1.0, 2.0])
-    margins = {"a": np.array([0.0, 0.0, 0.0]), "b": np.array([1.0, 1.0, np.nan]),
-               "c": np.array([-5.0, 2.0, 2.0])}  # fmt: skip
-    touching = {"a": np.ones(3, bool), "b": np.ones(3, bool), "c": np.array([False, True, True])}
-    thresholds = {"a": 2.0, "b": 0.0, "c": 0.0}
-    fingers = [Scores.of_finger(times, margins[f], thresholds[f], touching[f]) for f in margins]
-    found = Scores.of_hand(fingers).probability
-    odds = np.exp([1.0, 1.0, 2.0])
-    assert found == pytest.approx(odds / (1 + odds))
-
-
 def test_a_whole_hand_method_decides_for_no_finger():
     """Its estimate of the hand is the latest one of every finger."""
     recording = replace(
@@ -93,16 +81,6 @@ def corpus(tmp_path_factory):
     return scan_corpus("main", save_synthetic(tmp_path_factory.mktemp("fitted") / "main", range(4)))
 
 
-def test_training_samples_are_bounded_and_spread_over_all_recordings(corpus):
-    training = MethodTraining.of(
-        METHODS["logreg"], corpus_features(METHODS["logreg"], corpus), max_samples=100
-    )
-    for samples in training.samples.values():
-        assert len(samples.positive) <= 100
-        assert np.bincount(samples.groups).min() >= 20
-        assert np.isfinite(samples.features).all()
-
-
 def test_a_missing_finger_is_not_evaluated(corpus):
     method = METHODS["logreg"]
     recordings = corpus_features(method, corpus)
@@ -111,18 +89,6 @@ def test_a_missing_finger_is_not_evaluated(corpus):
     decided = fitted.scores(lacking).decide(lacking.labels)
     assert set(decided.fingers) == {"thumb"}
     assert (decided.hand.states == STABLE).any()
-
-
-def test_a_hand_without_a_finger_is_unknown_to_a_whole_hand_method(corpus):
-    method = METHODS["jl_global_logreg"]
-    recordings = corpus_features(method, corpus)
-    lacking = without(recordings[3], "index")
-    narrow = {HAND: lacking.features[HAND][:, :36]}
-    lacking = replace(lacking, features=narrow)
-    fitted = MethodTraining.of(method, [*recordings[:3], lacking]).fit()
-    assert (fitted.scores(lacking).decide(lacking.labels).hand.states == UNKNOWN).all()
-    known = fitted.scores(recordings[0]).decide(recordings[0].labels).hand
-    assert (known.states == STABLE).any()
 
 
 def without(recording, finger):
@@ -143,32 +109,3 @@ def test_one_class_gives_no_classifier_and_no_scores(corpus):
     decided = fitted.scores(one).decide(one.labels)
     assert (decided.hand.states == UNKNOWN).all()
     assert all((finger.states == UNKNOWN).all() for finger in decided.fingers.values())
-
-
-def hand_scores(margin, known=None, grasped=None, rate=100.0):
-    margin = np.array(margin, dtype=float)
-    n = len(margin)
-    return Scores(
-        times=np.arange(n) / rate,
-        margin=margin,
-        known=np.ones(n, dtype=bool) if known is None else np.array(known, dtype=bool),
-        grasped=np.ones(n, dtype=bool) if grasped is None else np.array(grasped, dtype=bool),
-        probability=np.full(n, 0.5),
-    )
-
-
-def test_no_state_is_held_without_a_grasped_object_or_with_an_unknown_finger():
-    grasped, known = [1, 1, 1, 0, 1, 1], [1, 1, 1, 1, 0, 1]
-    found = hand_scores([1, 1, -1, np.inf, 1, 1], known, grasped).hold(0.04).states()
-    assert found.tolist() == [STABLE, STABLE, UNSTABLE, NO_CONTACT, UNKNOWN, UNSTABLE]
-
-
-@pytest.mark.parametrize("shift", [-0.5, 0.0, 0.5])
-def test_holding_the_scores_equals_holding_the_states(shift):
-    rng = np.random.default_rng(0)
-    bare = hand_scores(rng.normal(1.0, 1.0, size=300))
-    states, expected = bare.states(shift), []
-    for k in range(len(states)):
-        recent = states[max(0, k - 4) : k + 1]
-        expected.append(UNSTABLE if (recent == UNSTABLE).any() else states[k])
-    assert bare.hold(0.05).states(shift).tolist() == expected

@@ -47,13 +47,3 @@ def test_nothing_slides_that_is_not_held_or_not_touched():
         f: {**own, "contact_force": np.zeros((len(TIMES), 3))} for f, own in moved.fingers.items()
     }
     assert count_glitches(replace(moved, fingers=fingers)).distances == [0.0]
-
-
-def test_glitches_are_counted_with_the_distance_that_the_object_slides():
-    calm = count_glitches(sliding())
-    assert calm.distances == [0.0]
-    assert calm.grasped_seconds == pytest.approx(7.2, abs=0.01)
-    moved = count_glitches(sliding((5.6, 5.9), (GLITCH + 0.05, GLITCH + 0.25)))
-    assert moved.distances == [pytest.approx(2e-3, rel=0.01)]
-    assert count_glitches(sliding((GLITCH + 0.2, GLITCH + 0.3))).distances == [0.0]
-    assert count_glitches(None).distances == []

@@ -1,7 +1,5 @@
 """Methods on the details of the Haar window."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -21,13 +19,6 @@ def test_energy_by_hand():
     hand = pressed(along_normal([1, 3, 3, 2, 6, 6]))
     found = normal_energy(hand, window=4)["index"]
     np.testing.assert_allclose(found[:, 0], [NAN, NAN, NAN, 2.5, 8.0, 0.5])
-
-
-def test_energy_does_not_depend_on_shear():
-    values = along_normal(np.arange(30.0) ** 2)
-    sheared = values + np.outer(np.arange(30) % 7, [1.0, -2.0, 0.0])
-    one, two = (METHODS["zhang"].features(pressed(v))["index"] for v in (values, sheared))
-    np.testing.assert_allclose(one, two)
 
 
 def test_energy_is_spread_and_mean_of_the_details():
@@ -62,27 +53,3 @@ def test_the_largest_sigma_of_all_fingers_as_each_finger_knows_it():
             ]
             known = [value for value in latest if np.isfinite(value)]
             assert rows[k, 2] == pytest.approx(max(known, default=np.nan), nan_ok=True)
-
-
-def test_a_silent_finger_is_left_out_of_the_largest_sigma():
-    recording = tiny_recording(0)
-    first, second = recording.modules
-    module = recording.modules[second]
-    readings = np.array(module.readings, dtype=float)
-    readings[len(readings) // 2 :] = np.nan
-    broken = replace(module, readings=readings)
-    modules = {**recording.modules, second: broken}
-    hand = hand_signal(replace(recording, modules=modules), Tare.parse("0.5"), (first, second))
-    rows = METHODS["log_hand"].features(hand)
-    half = len(readings) // 2
-    assert rows[first][half + 5 :, 2] == pytest.approx(rows[first][half + 5 :, 1])
-    assert np.isnan(rows[second][half + 5 :]).any(axis=1).all()
-
-
-def test_the_energy_keeps_the_mean_of_the_details():
-    """A slope of 3 a sample: every detail is -3 / sqrt(2), so E = 7 x 9 / 2 and sigma = 0."""
-    hand = pressed(along_normal(100 + 3.0 * np.arange(30)))
-    energy = METHODS["energy"].features(hand)["index"][13:, 0]
-    assert energy == pytest.approx(np.full(17, np.log10(31.5)))
-    sigma = METHODS["log_two"].features(hand)["index"][13:, 1]
-    assert (sigma < -5).all()

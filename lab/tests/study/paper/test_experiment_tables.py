@@ -7,7 +7,6 @@ import pytest
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE, Phase
 from holdfast.metrics import FingerDecisions
 from holdfast.recordings import Truth
-from holdfast_lab.study.paper import experiment_tables
 from holdfast_lab.study.paper.experiment_tables import find_disturbances, stable_after_lock
 from holdfast_lab.study.plan import StudyPlan, scan_corpus
 from study.example_recordings import TIMES, inside, recording_with_truth, save_all, truth_of
@@ -75,27 +74,3 @@ def plan(tmp_path_factory):
             made.append(replace(recording, metadata={**recording.metadata, "case": case}))
         corpora[role] = scan_corpus(role, save_all(folder / role, made))
     return StudyPlan(corpora, quick=True)
-
-
-def test_the_tables(plan):
-    results = {task.name: task.function(*task.arguments) for task in experiment_tables.tasks(plan)}
-    one, two, phases, single = experiment_tables.tables(plan, results)
-    called = {(r.keys["experiment"], r.keys["phase"]): r.ours for r in phases.rows}
-    assert called["1: failed", "disturbed"] and called["2: held", "disturbed"]
-    failed = {(r.keys["on"], r.keys["figure"]): r.ours for r in one.rows}
-    assert failed["vigorous profile", "failed grasps"] == 2
-    assert {on for on, _ in failed} == {"vigorous profile"}
-    counts = np.sum(
-        [each.unstable for each in results["experiments/logreg"] if each.case == "failed"], axis=0
-    )
-    logreg = next(
-        r for r in one.rows
-        if r.keys["figure"] == "of its unstable samples [%]"
-        and str(r.keys["method"]).startswith("LogReg")
-    )  # fmt: skip
-    assert logreg.ours == pytest.approx(100 * counts[1] / counts[0])
-    disturbances = [r.ours for r in two.rows if r.keys["figure"] == "disturbances"]
-    assert disturbances == [4, 4]
-    assert {r.keys["recording"] for r in single.rows} == {"grasp-0", "grasp-1", "grasp-2"}
-    detected = [r.ours for r in single.rows if str(r.keys["figure"]).endswith(": detected")]
-    assert len(detected) == 6 and set(detected) <= {0.0, 1.0}

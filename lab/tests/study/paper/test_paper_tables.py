@@ -1,4 +1,3 @@
-import msgspec
 import pytest
 
 from holdfast.detection import DEPLOYED_FEATURES, FEATURE_NAMES
@@ -32,16 +31,6 @@ def quick(corpora):
     return made(StudyPlan(corpora, quick=True))
 
 
-def test_every_value_has_a_number_of_recordings_and_an_interval(quick):
-    for name in NAMES[:-1]:
-        for row in quick[name].rows:
-            assert row.n in (2, 4)
-            if row.ours is not None:
-                low, high = row.interval
-                assert -1e-9 <= low <= row.ours + 1e-9
-                assert row.ours <= high + 1e-9 <= 100 + 2e-9
-
-
 def test_confusion_has_a_line_for_each_kind_of_test_data(quick):
     table = quick["confusion"]
     assert len(table.rows) == 4 * 5 * 5
@@ -72,21 +61,6 @@ def test_values_of_the_paper_are_beside_ours(quick, name, keys, values):
     assert {row.paper for row in rows_of(quick[name], **keys)} == values
 
 
-def test_one_classifier_has_the_same_values_in_every_table(quick):
-    def figure(table, **keys):
-        (row,) = rows_of(quick[table], on="held out", figure="accuracy", **keys)
-        return row.ours
-
-    shared = figure("confusion", classifier="LogReg")
-    assert figure("window", features="deployed", N_w=14) == shared
-    assert figure("ablation", features="F_a, F_tip, sigma", N_w=14) == shared
-    assert figure("fingers", finger="index", classifier="LogReg") == shared
-    assert figure("zhang", method="LogReg (the paper)", N_w=14) == shared
-    assert figure("window", features="all six", N_w=18) == figure(
-        "ablation", features="F_a, F_tip, m, sigma", N_w=18
-    )
-
-
 def test_each_classifier_is_fitted_once():
     corpus = Corpus("main", "data", ("a", "b"), "digest", ("thumb", "index"), 150.0)
     kinds = [
@@ -95,13 +69,6 @@ def test_each_classifier_is_fitted_once():
         for kind in task.arguments[3]
     ]
     assert len(kinds) == len(set(kinds)) == 2 * 2 + 2 + 8 * 4 - 1 + 2 * 9
-
-
-def test_the_first_finger_is_the_index_if_there_is_one():
-    corpus = Corpus("main", "data", ("a", "b"), "digest", ("finger1", "finger2"), 150.0)
-    assert paper_tables.first_finger(StudyPlan({"main": corpus})) == "finger1"
-    named = msgspec.structs.replace(corpus, fingers=("thumb", "index"))
-    assert paper_tables.first_finger(StudyPlan({"main": named})) == "index"
 
 
 def test_the_force_is_three_features():

@@ -1,11 +1,8 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from holdfast.detection import DEPLOYED_FEATURES, Linear
-from holdfast.training.classifiers.fitting import Fitted, Samples
-from holdfast.training.classifiers.logreg import LogisticRegression
+from holdfast.detection import DEPLOYED_FEATURES
+from holdfast.training.classifiers.fitting import Samples
 from holdfast_lab.study.paper.pooled_samples import pool_samples
 from holdfast_lab.study.paper.random_split import (
     CONFUSION_RATES,
@@ -17,11 +14,8 @@ from holdfast_lab.study.paper.random_split import (
     UNSEEN_OBJECTS,
     VALIDATED,
     FitBudget,
-    FixedWeights,
-    confusion_counts,
     evaluate_variants,
     rate_rows,
-    search,
 )
 from study.example_recordings import corpora_of
 
@@ -91,13 +85,6 @@ def test_kinds_of_test_data(corpora, alone):
     assert list(evaluated(corpora, thorough=False)[0].counts) == [HELD_OUT, FRESH, UNSEEN_OBJECTS]
 
 
-def test_fresh_recordings_are_all_of_them(corpora):
-    counts = evaluated(corpora, thorough=False)[0].counts
-    fresh = pool_samples(corpora["fresh"], 150.0, "index", 14, seed=0)
-    assert np.sum(counts[FRESH], axis=1).tolist() == np.bincount(fresh.samples.groups).tolist()
-    assert len(counts[UNSEEN_OBJECTS]) == 2
-
-
 def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):
     main = {"main": corpora["main"]}
     assert evaluated(main) == alone
@@ -109,92 +96,6 @@ def test_the_split_is_reproducible_and_depends_on_the_seed(corpora, alone):
 def test_a_fit_has_a_maximum_number_of_samples(corpora):
     cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(1, 500))[0]
     assert 400 < cell.n_fitted <= 500
-
-
-def test_a_search_tries_more_than_the_reference(corpora, alone):
-    reference = FIT_RECIPES["logreg"].reference
-    assert alone[0].parameters == reference
-    drawn = []
-    fit = LogisticRegression.fit
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(
-            LogisticRegression, "fit", lambda *given: drawn.append(given[2]) or fit(*given)
-        )
-        cell = evaluated({"main": corpora["main"]}, thorough=False, budget=FitBudget(4, 500))[0]
-    assert set(cell.parameters) == set(reference)
-    assert len({each["C"] for each in drawn}) == 4
-
-
-@pytest.mark.parametrize("name", ["logreg", "svm"])
-def test_the_search_takes_the_fewest_errors_of_its_trials(name):
-    """Counted from the definition for every C that was drawn, the reference among them."""
-    rng = np.random.default_rng(0)
-    positive, groups = rng.random(200) < 0.4, np.arange(200) % 4
-    features = rng.normal(size=(200, 3)) + 0.6 * positive[:, None]
-    samples = Samples(features, positive, np.zeros(200, dtype=int))
-    drawn, folds, recipe = [], [groups == k for k in range(4)], FixedWeights(name, None)
-    fit = type(recipe.recipe).fit
-
-    def noted(self, samples, parameters, seed):
-        drawn.append(parameters)
-        return fit(self, samples, parameters, seed)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(type(recipe.recipe), "fit", noted)
-        best = search(samples, folds, recipe, 6, 0)
-    tried = drawn[::4]
-    assert tried[0] == recipe.reference
-    assert len({parameters["C"] for parameters in tried}) == 6
-
-    def n_wrong(parameters):
-        fits = [(recipe.fit(samples.take(~held), parameters, 0), held) for held in folds]
-        return sum(
-            ((rule.probability(features[held]) >= rule.threshold) != positive[held]).sum()
-            for rule, held in fits
-        )
-
-    assert best in tried
-    assert n_wrong(best) == min(map(n_wrong, tried))
-
-
-def test_class_weights_are_fixed_whatever_the_search_draws(corpora):
-    for name, weight in (("logreg", None), ("logreg_balanced", "balanced")):
-        kinds = [(name, DEPLOYED_FEATURES)]
-        main = {"main": corpora["main"]}
-        budget = FitBudget(4, 500)
-        (cell,) = evaluate_variants(main, "index", 14, kinds, budget, 0, thorough=False)
-        assert cell.parameters["class_weight"] == weight
-
-
-RULE = Fitted(Linear((0.0,), (1.0,), ((1.0,),), (0.0,)), 0.5)
-"""Stable where the feature is at least 0."""
-
-
-def count_one_by_one(features, stable, groups, n):
-    """[TN, FP, FN, TP] of each recording, sample by sample."""
-    found = [[0, 0, 0, 0] for _ in range(n)]
-    for value, truth, group in zip(features[:, 0], stable, groups, strict=True):
-        called = value >= 0
-        found[group][
-            ["TN", "FP", "FN", "TP"].index(
-                ("T" if called == truth else "F") + ("P" if called else "N")
-            )
-        ] += 1
-    return found
-
-
-@given(
-    st.lists(
-        st.tuples(st.sampled_from([-1.0, 0.0, 2.0]), st.booleans(), st.integers(0, 3)), max_size=60
-    )
-)
-@settings(max_examples=50)
-def test_confusions_are_those_of_a_loop(rows):
-    features = np.array([[row[0]] for row in rows]).reshape(-1, 1)
-    stable = np.array([row[1] for row in rows], dtype=bool)
-    groups = np.array([row[2] for row in rows], dtype=np.int64)
-    found = confusion_counts(RULE, Samples(features, stable, groups), 5)
-    assert found.tolist() == count_one_by_one(features, stable, groups, 5)
 
 
 def test_rates_by_hand():

@@ -1,6 +1,5 @@
 """Readings that no skin gives: a grip ends in FAULT, and an open hand begins none."""
 
-from contextlib import nullcontext
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from holdfast.detection import Detector, Model
 from holdfast.sensors import sensor
 from holdfast_grip import GripController, Limits, LoopState
-from holdfast_grip.errors import HandError
 from holdfast_grip.hands.base import HandDevice
 from holdfast_grip.loop.grip_loop import GripLoop
 
@@ -147,40 +145,3 @@ def test_a_grip_on_readings_that_no_skin_gives_ends_in_a_fault(row):
     assert set(states[latest:]) == {LoopState.FAULT}
     scales = [{one.scale for one in x.fingers.values()} for x in commands if x.time > TIMES[latest]]
     assert all(scale == scales[0] for scale in scales)
-
-
-def constant(first):
-    first[:] = 17.0
-
-
-def zeros(first):
-    first[:] = 0.0
-
-
-def one_zero(first):
-    first[2] = 0.0
-
-
-def far(first):
-    first += 500.0
-
-
-FIRST = {x.__name__: x for x in (constant, zeros, one_zero, far)}
-
-
-@pytest.mark.parametrize("spoil", FIRST.values(), ids=FIRST)
-def test_a_first_reading_that_is_none_begins_no_grip_of_an_open_hand(spoil):
-    hand = grasp()
-    for readings in hand.values():
-        spoil(readings[0])
-    states, _ = held(hand)
-    assert set(states[:200]) == {LoopState.IDLE}
-    assert states[-1] is LoopState.HOLD
-
-
-@pytest.mark.parametrize("armed", [True, False])
-def test_a_dead_module_arms_no_grip(armed):
-    hand = grasp()
-    hand["index"][:] = 40.0
-    with pytest.raises(HandError, match=r"index.*dead") if armed else nullcontext():
-        held(hand, armed=armed)

@@ -67,37 +67,12 @@ def test_the_list(capsys):
     assert (document["licence"], document["size"], document["tried"]) == ("MIT", 26_000_000, True)
 
 
-@pytest.mark.parametrize("words", [(), ("list", "gtac-grasps")])
-def test_the_list_as_text(capsys, words):
-    code, out, _ = VERB.run(capsys, *words)
-    assert code == 0
-    assert "gtac" in out
-
-
 def test_from_the_registry_to_recordings(capsys, made_up, cache):
     document = document_of(capsys, "get", "made-up", "out")
     assert (document["n_files"], document["n_unchecked"], document["n_recordings"]) == (2, 2, 2)
     assert load_recording(document["recordings"][0]["path"]).modules["finger1"].n_samples == 200
     assert sorted(p.name for p in cache.rglob("*")) == ["made-up", "one.csv", "two.csv"]
     assert made_up.requests == ["made-up/one.csv", "made-up/two.csv"]
-
-
-def test_the_command_that_is_printed(capsys, made_up):
-    code, _, err = VERB.run(capsys, "get", "made-up")
-    assert code == 0
-    command = err.rpartition("next: holdfast ")[2].split()
-    assert main(command) == 0
-
-
-def test_only_some_files(capsys, made_up):
-    document = document_of(capsys, "get", "made-up", "a", "--only", "*two*")
-    assert [recording["name"] for recording in document["recordings"]] == ["two"]
-    VERB.run(capsys, "get", "made-up", "b")
-    document = document_of(capsys, "get", "made-up", "c", "--only", "one.csv")
-    assert [recording["name"] for recording in document["recordings"]] == ["one"]
-    assert len(made_up.requests) == 2
-    for words in (["--only", "three"], ["--with-checksum"]):
-        assert "one.csv" in refused(capsys, "get", "made-up", "d", *words)
 
 
 def test_a_mirror(capsys, made_up, monkeypatch):
@@ -121,12 +96,6 @@ def test_bad_input(capsys, made_up, cache):
     text = refused(capsys, "get", "made-up", "out")
     assert f"{cache}/made-up/two.csv" in text
     assert ".import." not in text
-
-
-def test_nothing_is_overwritten(capsys, made_up):
-    document_of(capsys, "get", "made-up", "out")
-    assert "exists already" in refused(capsys, "get", "made-up", "out")
-    document_of(capsys, "get", "made-up", "out", "--force")
 
 
 @pytest.mark.parametrize("name", FOLDERS)

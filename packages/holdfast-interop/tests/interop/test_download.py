@@ -8,7 +8,7 @@ pytest.importorskip("pooch", reason="pooch is not installed")
 
 from holdfast.errors import OutputError, SourceError
 from holdfast_interop.datasets import PublicFile, PublicSet
-from holdfast_interop.datasets.download import N_RETRIES, download_files, download_folder
+from holdfast_interop.datasets.download import N_RETRIES, download_files
 from loopback import serving
 
 # pooch leaves the connection of a failed try to the garbage collector.
@@ -109,10 +109,3 @@ def test_a_folder_that_cannot_be_written(server, tmp_path):
     (tmp_path / "got").write_text("a file")
     with pytest.raises(OutputError, match="made-up"):
         get(server)
-
-
-def test_an_environment_variable_moves_the_folder(monkeypatch, tmp_path):
-    monkeypatch.setenv("HOLDFAST_DATASETS", str(tmp_path))
-    assert download_folder("a") == tmp_path / "a"
-    monkeypatch.delenv("HOLDFAST_DATASETS")
-    assert download_folder("a").parent.name == "holdfast"

@@ -61,14 +61,6 @@ def test_labels_as_the_authors_have_them(tmp_path):
     assert f"{tmp_path / 'labels'}, line 2" in refusal(tmp_path / "seq_0.pt")
 
 
-def test_labels_can_be_left_out(tmp_path):
-    write(tmp_path / "seq_9.pt")
-    (tmp_path / "labels.csv").write_text("sequence,slip\n9,1\n")
-    (recording,) = import_recordings(tmp_path, labels=False)
-    assert "slipped" not in recording.metadata
-    assert recording.metadata["starts_loaded"]
-
-
 class Bomb:
     """Creates a file if it is unpickled."""
 
@@ -106,12 +98,6 @@ def test_nothing_is_unpickled(tmp_path):
 def test_tensors_of_another_form(tmp_path, values, members, text):
     path = write(tmp_path / "seq_1.pt", values, **members)
     assert re.search(rf"seq_1\.pt: .*{text}", refusal(path))
-
-
-def test_a_value_that_is_no_number(tmp_path):
-    values = VALUES.copy()
-    values[3, 7] = np.inf
-    assert "seq_1.pt, row 3, value 7" in refusal(write(tmp_path / "seq_1.pt", values))
 
 
 def test_cut_and_damaged_files(tmp_path):

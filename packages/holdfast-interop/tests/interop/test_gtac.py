@@ -70,14 +70,6 @@ def test_the_second_gripper_has_a_rate_in_place_of_times(tmp_path):
     assert servos.tolist() == [[0, 79], [0, 79], [1, 79], [1, 79]]
 
 
-def test_servos_without_the_first_row(tmp_path):
-    rows_with_servos = [[*row[:46], 10 + k, row[-2], row[-1]] for k, row in enumerate(rows(3, 1))]
-    rows_with_servos[0][-1] = ""
-    write(tmp_path / "a.csv", ["", *NAMED, "servo_1", "Hz", "milliseconds"], rows_with_servos)
-    (recording,) = import_recordings(tmp_path)
-    assert recording.truth.hand["servo_positions"].tolist() == [[11], [12]]
-
-
 @pytest.mark.parametrize("rate", [0, -157, "", "nan", "inf"])
 def test_a_second_gripper_without_a_rate(tmp_path, rate):
     table = rows_of_gripper2(4)
@@ -94,12 +86,6 @@ def test_the_real_recordings_of_the_second_gripper(data_folder):
         assert recording.modules["finger1"].rate == pytest.approx(157.5, abs=0.6)
         moves = np.diff(recording.truth.hand["servo_positions"], axis=0).any(axis=1)
         assert 0 < np.flatnonzero(moves)[-1] < 0.7 * len(moves)
-
-
-def test_other_columns(tmp_path):
-    write(tmp_path / "a.csv", ["a", "b"], [[1, 2]])
-    with pytest.raises(RecordingError, match="mag_x1"):
-        list(import_recordings(tmp_path / "a.csv", "gtac"))
 
 
 def test_the_real_recordings(data_folder):

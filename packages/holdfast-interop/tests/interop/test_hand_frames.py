@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import hand, sensor
-from holdfast_interop.scene.hand_frames import allegro_links, frames_of, quaternions
+from holdfast_interop.scene.hand_frames import allegro_links, frames_of
 
 
 def module(name):
@@ -31,13 +31,6 @@ def test_links_are_those_of_the_twin():
             body = data.body(name)
             assert np.abs(palm.xpos + turn @ position - body.xpos).max() < 1e-9, name
             assert np.abs(turn @ rotation - body.xmat.reshape(3, 3)).max() < 1e-9, name
-
-
-def test_quaternions_are_those_of_scipy():
-    turns = Rotation.random(200, rng=np.random.default_rng(0))
-    got = quaternions(turns.as_matrix())
-    want = turns.as_quat()[:, [3, 0, 1, 2]]
-    assert np.abs(np.abs((got * want).sum(axis=1)) - 1).max() < 1e-12
 
 
 def test_taxels_are_where_the_hand_has_them():

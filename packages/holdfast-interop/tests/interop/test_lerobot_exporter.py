@@ -12,7 +12,7 @@ from holdfast.errors import OutputError, RecordingError
 from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import flat_sensor, sensor
 from holdfast.synthetic import synthetic_recording
-from holdfast_interop.lerobot.exporter import ColumnStatistics, export
+from holdfast_interop.lerobot.exporter import export
 
 DATA = "data/chunk-000/file-000.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
@@ -82,17 +82,6 @@ def test_columns_have_the_types_and_shapes_of_the_features(info, table):
         ) == feature["dtype"]  # fmt: skip
 
 
-def test_counters_run_on_and_times_are_those_of_frames(table):
-    assert column(table, "index").tolist() == list(range(692))
-    episodes = column(table, "episode_index")
-    for episode, n in ((0, 346), (1, 346)):
-        frames = column(table, "frame_index")[episodes == episode]
-        assert frames.tolist() == list(range(n))
-        stamps = column(table, "timestamp")[episodes == episode]
-        assert np.abs(stamps - frames / 30).max() < 1e-5
-    assert (column(table, "task_index") == episodes).all()
-
-
 def test_an_episode_is_a_row_group_and_says_where_it_is(data_set):
     file = pq.ParquetFile(data_set / DATA)
     assert [file.metadata.row_group(k).num_rows for k in range(file.num_row_groups)] == [346, 346]
@@ -111,14 +100,6 @@ def test_an_episode_is_a_row_group_and_says_where_it_is(data_set):
     ]  # fmt: skip
 
 
-def test_tasks_are_the_index_that_pandas_reads(data_set):
-    pandas = pytest.importorskip("pandas")
-    tasks = pandas.read_parquet(data_set / "meta/tasks.parquet")
-    assert tasks.index.tolist() == ["grasp object 0", "lift the cup"]
-    assert tasks["task_index"].tolist() == [0, 1]
-    assert tasks.index.name == "task"
-
-
 def test_a_frame_has_the_newest_samples_up_to_it(recordings, table):
     index = recordings[0].modules["index"]
     start = recordings[0].start
@@ -131,19 +112,6 @@ def test_a_frame_has_the_newest_samples_up_to_it(recordings, table):
         assert values[frame].tolist() == index.readings[rows].tolist()
 
 
-def test_a_missing_finger_has_no_new_samples(table):
-    missing = column(table, "episode_index") == 1
-    assert (column(table, "observation.tactile.thumb.new")[missing] == 0).all()
-    assert np.isnan(column(table, "observation.tactile.thumb")[missing]).all()
-    assert (column(table, "label.thumb")[missing] == 0).all()
-
-
-def test_labels_are_those_of_the_newest_sample(recordings, table):
-    states = recordings[0].modules["thumb"].label_states
-    new = column(table, "observation.tactile.thumb.new")[:346]
-    assert column(table, "label.thumb")[:346].tolist() == states[np.cumsum(new) - 1].tolist()
-
-
 def test_statistics_are_those_of_the_frames_without_nan(data_set, info, table):
     stats = json.loads((data_set / "meta/stats.json").read_text())
     assert list(stats) == list(info["features"])
@@ -153,33 +121,6 @@ def test_statistics_are_those_of_the_frames_without_nan(data_set, info, table):
             got, want = np.array(stats[name][key]), function(values, axis=0)
             assert np.allclose(got.reshape(want.shape), want, rtol=1e-9), (name, key)
         assert stats[name]["count"] == [692]
-
-
-def test_a_signalling_nan_is_no_number():
-    statistics = ColumnStatistics((1,))
-    statistics.add(np.array([[0x3F800000], [0x7FA00000]], dtype=np.uint32).view(np.float32))
-    assert statistics.result()["mean"] == [1.0]
-
-
-def test_the_library_datasets_reads_it(data_set, info, recordings, tmp_path):
-    datasets = pytest.importorskip("datasets")
-    features = {}
-    for name, feature in info["features"].items():
-        shape, value = tuple(feature["shape"]), datasets.Value(feature["dtype"])
-        if shape == (1,):
-            features[name] = value
-        elif len(shape) == 1:
-            features[name] = datasets.Sequence(value, length=shape[0])
-        else:
-            kind = getattr(datasets, f"Array{len(shape)}D")
-            features[name] = kind(shape=shape, dtype=feature["dtype"])
-    read = datasets.Dataset.from_parquet(
-        [str(data_set / DATA)], features=datasets.Features(features), cache_dir=str(tmp_path)
-    )
-    frame = read.with_format("numpy")[100]
-    assert frame["observation.tactile.index"].shape == (5, 30, 3)
-    last = recordings[0].modules["index"].readings[500]
-    assert (frame["observation.tactile.index"][-1] == last).all()
 
 
 def refusal(error, recordings, out, **options):
@@ -222,12 +163,3 @@ def test_only_a_data_set_is_replaced(recordings, tmp_path):
         with pytest.raises(OutputError, match="is not such an export"):
             export(recordings[1:], folder, force=True)
         assert file.read_text() == "{}"
-
-
-def test_a_full_disk_leaves_nothing(recordings, tmp_path, monkeypatch):
-    def full(*_args, **_options):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(pq.ParquetWriter, "write_table", full)
-    message = refusal(OutputError, recordings, tmp_path / "set")
-    assert "No space left on device" in message

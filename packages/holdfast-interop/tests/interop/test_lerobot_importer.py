@@ -1,7 +1,6 @@
 """Recordings come back from a LeRobot data set as they were."""
 
 import json
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -81,30 +80,6 @@ def test_a_finger_may_be_missing_and_number_types_may_differ(make_recording, ass
         assert_same(got, want)
 
 
-def test_a_gap_stays_a_gap(make_recording, assert_same, tmp_path):
-    recording = make_recording()
-    module = recording.modules["thumb"]
-    times = module.times + np.where(np.arange(module.n_samples) >= 300, 20.0, 0.0)
-    with_gap = replace(recording, modules={"thumb": replace(module, times=times, labels=())})
-    export([with_gap], tmp_path / "set")
-    (read,) = import_recordings(tmp_path / "set")
-    assert read.modules["thumb"].n_gaps == 1
-    assert_same(read, with_gap)
-
-
-def test_long_recordings_are_several_row_groups(make_recording, assert_same, tmp_path, monkeypatch):
-    from holdfast_interop.lerobot import exporter
-
-    monkeypatch.setattr(exporter, "MAX_GROUP_FRAMES", 50)
-    monkeypatch.setattr(exporter, "MAX_FILE_SIZE", 0)  # every episode has a file of its own
-    recordings = [make_recording(name=name) for name in ("a", "b")]
-    export(recordings, tmp_path / "set")
-    assert pq.ParquetFile(tmp_path / "set" / DATA).num_row_groups == 4
-    assert (tmp_path / "set" / "data/chunk-000/file-001.parquet").is_file()
-    for got, want in zip(import_recordings(tmp_path / "set"), recordings, strict=True):
-        assert_same(got, want)
-
-
 def test_a_changed_reading_is_found(data_set):
     def change(table):
         name = "observation.tactile.thumb"
@@ -161,12 +136,3 @@ def test_only_the_folder_of_a_data_set_is_recognised(data_set):
     assert not lerobot.can_read(data_set / "data")
     assert not lerobot.can_read(data_set / "meta/info.json")
     assert "has no meta/info.json" in refusal(data_set / "data")
-
-
-@pytest.mark.parametrize("part", ["meta/episodes", "data"])
-def test_a_file_that_is_missing_or_a_pipe_is_named(data_set, part):
-    path = data_set / part / "chunk-000/file-000.parquet"
-    path.unlink()
-    refusal(data_set)
-    os.mkfifo(path)
-    assert "a pipe" in refusal(data_set)

@@ -1,11 +1,5 @@
 """Files and the live view of Rerun, read back by its own reader; .ci/rerun runs this."""
 
-import os
-import signal
-import socket
-import subprocess
-import sys
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -15,9 +9,8 @@ from command_line import Verb
 from holdfast.cli import main
 from holdfast.detection import Model, detect
 from holdfast.detection.traces import STATE_BY_CODE
-from holdfast.errors import SourceError, is_installed
+from holdfast.errors import is_installed
 from holdfast.io import save_recording
-from holdfast.live.stream_detector import StreamDetector
 from holdfast.synthetic import synthetic_recording
 from holdfast_interop.scene.tracks import events
 
@@ -96,62 +89,3 @@ class TestFile:
         assert len(arrows) == int(grasp.duration * 30) + 1
         assert max(map(len, arrows)) <= sensor.n_taxels
         assert np.linalg.norm(np.concatenate([a for a in arrows if a]), axis=1).max() > 0.015
-
-
-@needs_rerun
-@pytest.mark.filterwarnings("ignore:RRD file has no footer")  # the viewer was ended
-class TestLive:
-    @pytest.mark.timeout(120)
-    def test_a_viewer_gets_every_estimate(self, grasp, model, tmp_path):
-        from holdfast import open_source
-        from holdfast_interop.rerun.publisher import RerunPublisher
-
-        save_recording(grasp, tmp_path / "grasp.mcap")
-        with socket.create_server(("127.0.0.1", 0)) as server:
-            port = server.getsockname()[1]
-        with open_source(str(tmp_path / "grasp.mcap"), speed=0) as source:
-            publisher = RerunPublisher(StreamDetector(model, source), port)
-            with pytest.raises(SourceError, match=str(port)):  # no viewer listens yet
-                publisher.open()
-        words = ["--save", "live.rrd", "--bind", "127.0.0.1", "--port", str(port)]
-        command = [sys.executable, "-m", "rerun", *words]
-        viewer = subprocess.Popen(command, cwd=tmp_path, start_new_session=True)
-        try:
-            wait_for(port)
-            with open_source(str(tmp_path / "grasp.mcap"), speed=20) as source:
-                stream, n = StreamDetector(model, source), 0
-                with RerunPublisher(stream, port) as publisher:
-                    while not source.ended:
-                        update = stream.read()
-                        publisher.put(update)
-                        n += sum("thumb" in fingers for _, fingers in update.estimates)
-                assert (publisher.n_failed, publisher.n_dropped) == (0, 0)
-            wait_until_written(tmp_path / "live.rrd")
-        finally:
-            os.killpg(viewer.pid, signal.SIGTERM)  # the command is the parent of the viewer
-            viewer.wait(30)
-        found = entities(tmp_path / "live.rrd")
-        assert n > 1000
-        assert len(found["/force/thumb"]["scalars"]) == n
-        assert {"/states/hand", "/states/thumb", "/events"} <= found.keys()
-        assert any(found["/hand/palm_link/thumb/arrows"]["vectors"])
-
-
-def wait_until_written(path):
-    """Wait until a file has not grown for a second: the viewer writes what came some time later."""
-    size, before = path.stat().st_size, -1
-    while size != before:
-        time.sleep(1)
-        size, before = path.stat().st_size, size
-
-
-def wait_for(port):
-    """Wait until a port is listened on."""
-    for _ in range(600):
-        try:
-            socket.create_connection(("127.0.0.1", port), 1).close()
-        except OSError:
-            time.sleep(0.1)
-        else:
-            return
-    pytest.fail("the viewer does not listen")

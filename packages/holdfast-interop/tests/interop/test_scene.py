@@ -1,25 +1,22 @@
 """What Rerun shows of a recording: arrows, frames, series and events."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from holdfast.detection import Model, detect
-from holdfast.errors import RecordingError
 from holdfast.recordings import Recording, Tactile, Truth
 from holdfast.sensors import sensor
 from holdfast.synthetic import synthetic_recording
 from holdfast_interop.scene.hand_frames import frames_of
 from holdfast_interop.scene.taxel_arrows import (
     LONGEST_ARROW,
-    SHORTEST_ARROW,
     arrow_scale,
     module_forces,
     scene_instants,
 )
-from holdfast_interop.scene.tracks import events, series, state_codes
+from holdfast_interop.scene.tracks import series, state_codes
 
 
 @pytest.fixture(scope="module")
@@ -65,18 +62,6 @@ def test_arrows_have_the_states_of_estimates_or_else_of_labels(grasp, traces):
             np.testing.assert_array_equal(codes, expected)
 
 
-def test_alarms_are_those_of_the_detector(grasp, traces):
-    state = traces["index"].state
-    n_alarms = sum(before == 3 and now not in (0, 3) for before, now in pairwise(state))
-    log = events(grasp, traces)
-    assert [event.time for event in log] == sorted(event.time for event in log)
-    alarms = [x for x in log if x.name == "index" and x.text.startswith("alarm")]
-    assert len(alarms) == n_alarms > 0
-    assert all(alarm.is_warning and "was STABLE" in alarm.text for alarm in alarms)
-    (marker,) = [event for event in log if event.name == "marker"]
-    assert (marker.text, marker.time) == ("grasped", 2.5)
-
-
 def test_an_arrow_points_along_the_reading():
     force = np.array([30.0, -40.0, 120.0])
     arrows = arrows_of(pressed(force))
@@ -84,25 +69,6 @@ def test_an_arrow_points_along_the_reading():
     assert not arrows[-1, 1:].any()
     along = sensor("anyskin").rotations[0] @ force / 130.0
     assert arrows[-1, 0] == pytest.approx(LONGEST_ARROW * along)
-
-
-def test_a_gap_has_no_arrow():
-    still, short = pressed([0, 0, 50.0]), pressed([0, 0, 50.0], 60)
-    both = Recording("both", {"a": still.modules["finger1"], "b": short.modules["finger1"]})
-    arrows = module_forces(both, scene_instants(both))
-    last = both.start + both.duration
-    assert arrows["a"].sample_at(last, 0.0) is not None
-    assert arrows["b"].sample_at(last, 0.0) is None
-    assert series(both, {})["force"]["a"][1][-1] == pytest.approx(50.0)
-
-
-def test_declared_baselines_and_newtons_under_load_keep_the_load():
-    module = pressed([0, 0, 0]).modules["finger1"]
-    base = np.full((5, 3), 990.0).tolist()
-    declared = Recording("a", {"finger1": module}, {"baselines": {"finger1": base}})
-    held = Recording("b", {"finger1": replace(module, unit="N")}, {"starts_loaded": True})
-    for recording in (declared, held):
-        assert (np.linalg.norm(arrows_of(recording)[0], axis=1) > SHORTEST_ARROW).all()
 
 
 def test_frames_move_with_the_measured_tips():
@@ -120,9 +86,3 @@ def test_frames_move_with_the_measured_tips():
     assert frames[0].at(1.5)[0] == pytest.approx(1.5)
     times, speeds = series(recording, {})["true_slip_speed"]["finger1"]
     assert speeds == pytest.approx(times)  # mm/s
-
-
-def test_a_recording_of_days_is_refused():
-    module = Tactile(sensor("anyskin"), [0.0, 1e5], np.zeros((2, 5, 3)))
-    with pytest.raises(RecordingError, match="at most 86400 s expected; cut it"):
-        scene_instants(Recording("long", {"finger1": module}))

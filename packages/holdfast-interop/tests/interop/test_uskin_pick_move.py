@@ -3,7 +3,6 @@ import re
 import numpy as np
 import pytest
 
-from holdfast.contact import Cause, ContactState
 from holdfast.errors import RecordingError
 from holdfast.io import import_recordings, load_recording, save_recording
 
@@ -65,17 +64,6 @@ def test_all_comes_along(folder):
     np.testing.assert_array_equal(truth["robot_joint_velocities"][0], np.arange(7, 14))
     np.testing.assert_array_equal(truth["robot_ee_pose"][0], np.arange(14, 30).reshape(4, 4).T)
     np.testing.assert_array_equal(truth["robot_velocity"][1], [130, 131])
-
-
-def test_slip_is_unstable_and_fail_is_lost(folder):
-    (recording,) = import_recordings(folder, "uskin-pick-move")
-    for module in recording.modules.values():
-        assert [(label.state, label.cause) for label in module.labels] == [
-            (ContactState.STABLE, None),
-            (ContactState.UNSTABLE, Cause.SLIP),
-            (ContactState.NO_CONTACT, Cause.LOST),
-        ]
-        assert (module.label_states == [3] * 2 + [2] * 4 + [1] * 6).all()
 
 
 def narrow(text):

@@ -133,13 +133,6 @@ class TestLive:
         one = arrivals[-1].samples["thumb"]
         assert any(np.array_equal(one, forces) for forces in FORCES)
 
-    def test_an_array_of_two_pads(self, published):
-        with published(array, "paxini_pkg", ARRAY):
-            sensors, arrivals = self.first_arrivals("ros2:///pad?fingers=1:left,2:right")
-        assert sensors == dict.fromkeys(("left", "right"), sensor("paxini-120"))
-        both = np.stack([arrivals[-1].samples[name] for name in ("left", "right")])
-        assert any(np.array_equal(both, counts) for counts in COUNTS)
-
     def test_own_types_by_their_definition(self, published, tmp_path):
         types = PADS["TactileSensor"] + "=====\nMSG: my_msgs/TactileTaxel\n" + PADS["TactileTaxel"]
         (tmp_path / "pad.msg").write_text(types)

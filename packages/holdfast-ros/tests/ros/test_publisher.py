@@ -167,16 +167,6 @@ def test_diagnostics_are_published_on_changes_and_periodically(monkeypatch):
             time.sleep(0.005)
 
 
-def test_opened_again_and_closed_twice():
-    publisher = FakePublisher()
-    publisher.close()
-    for _ in range(2):
-        with publisher:
-            publisher.publish(estimate(), ())
-    publisher.close()
-    assert publisher.log == ["ended", "ended"]
-
-
 BLIND = {
     reason: finger(ContactState.UNKNOWN, reason=reason, faults=faults)
     for reason, faults in (
@@ -206,14 +196,6 @@ def test_faulty_taxels_are_numbers_from_1():
     assert estimate().fingers["thumb"].faulty_taxels == (3, 7)  # indices
     values = dict(diagnostics_of((estimate(), 1.0), 1.0)[1].values)
     assert values["faulty_taxels"] == "4, 8"
-
-
-def test_diagnostics_before_and_after_estimates():
-    (before,) = diagnostics_of(None, 100.0)
-    assert before[:2] == ("hand", WARN)
-    (after,) = diagnostics_of((estimate(), 100.0), 103.2)
-    assert after[:2] == ("hand", ERROR)
-    assert after.values == (("seconds_since_estimate", "3"),)
 
 
 def test_topic_names_are_valid_in_ros():

@@ -117,14 +117,6 @@ def test_counts_of_more_than_16_bits_are_refused():
         unpack(encoded(types, message, ros2=False))
 
 
-def test_points_whose_axes_come_in_another_order():
-    text = SENS_STREAM.replace("uint16 x\nuint16 y\nuint16 z", "uint16 z\nuint16 y\nuint16 x")
-    types = store("p", XELA | {"Taxel": "uint16 z\nuint16 y\nuint16 x"}, ros2=False)
-    message = sens_stream(types, "p", (1, "", 7, 1.0, [[3, 2, 1], [6, 5, 4]], []))
-    unpack = SampleDecoder(parse_definition("xela_server_ros/SensStream", text), ros2=False)
-    assert unpack(encoded(types, message, ros2=False))[0].counts.tolist() == [[1, 2, 3], [4, 5, 6]]
-
-
 def test_unknown_messages():
     assert known_definition("std_msgs/msg/String") is None
     assert known_definition("other/SensStream") is None

@@ -1,5 +1,6 @@
 """Servers that send the messages of a test."""
 
+import logging
 import socket
 from contextlib import contextmanager
 from queue import SimpleQueue
@@ -9,8 +10,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.protocol import State
 from websockets.sync.server import serve
 
-from holdfast.devices.sources.xela.client import _LOGGER
-
+LOGGER = logging.getLogger("holdfast.devices.sources.xela")
 HANG_UP = object()
 """Message that makes the server close a connection."""
 
@@ -38,7 +38,7 @@ def server(first=(), *, port=0, broken=False):
         except ConnectionClosed:
             pass
 
-    with serve(send, "127.0.0.1", port, compression=None, close_timeout=1, logger=_LOGGER) as one:
+    with serve(send, "127.0.0.1", port, compression=None, close_timeout=1, logger=LOGGER) as one:
         thread = Thread(target=one.serve_forever)
         thread.start()
         try:

@@ -1,10 +1,7 @@
 import json
 
-import msgspec
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from holdfast.devices.sources.xela.packet import InvalidPacket, read_packet, read_sensor
 
@@ -78,27 +75,6 @@ def test_packets_without_samples(given):
 def test_sensors_are_the_keys_that_are_numbers():
     given = {"message": 1, "time": 2.0, "10": {}, "2": {}, "1": {}, "²": {}, "x": 1, "-3": {}}
     assert list(read_packet(json.dumps(given)).sensors) == [1, 2, 10]
-
-
-@pytest.mark.parametrize("digits", [str.upper, str.lower])
-@given(st.lists(st.integers(0, 65535), min_size=3, max_size=60))
-def test_hexadecimal_digits_of_either_case(digits, values):
-    values = values[: len(values) // 3 * 3]
-    data = ",".join(digits(f"{value:04x}") for value in values)
-    assert readings({"data": data}).ravel().tolist() == values
-    assert readings({"data": data, "integer": values}).ravel().tolist() == values
-    assert readings({"integer": values}).ravel().tolist() == values
-
-
-def test_spaces_and_escapes_of_json_are_read():
-    raw = rb'{"data": "00\u0030A,fFfF,0003", "integer": [ 10 ,65535,  3], "other": {}}'
-    part = read_sensor(msgspec.Raw(raw), calibrated=False)
-    assert part.readings().tolist() == [[10, 65535, 3]]
-
-
-@pytest.mark.parametrize("part", [{}, {"data": None}, {"data": "", "integer": []}])
-def test_without_readings(part):
-    assert readings(part) is None
 
 
 def test_what_is_not_finite_is_missing():

@@ -99,14 +99,14 @@ class NewtonRig:
     per_finger, driver = True, None
     fingers = ("thumb", "index", "middle", "ring")
 
-    def __init__(self, folder):
+    def __init__(self, folder, rate=1e-3):
         template = runpy.run_path(str(EXAMPLES / "hands" / "newton_hand.py"))
         self._peer = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._peer.bind(("127.0.0.1", 0))
         self._peer.setblocking(False)
         self._received = []
         self.hand = template["NewtonHand"](
-            self._peer.getsockname(), start_force=2.0, max_force=6.0, rate=1e-3
+            self._peer.getsockname(), start_force=2.0, max_force=6.0, rate=rate
         )
 
     def start(self):

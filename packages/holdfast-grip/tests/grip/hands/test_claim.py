@@ -1,6 +1,5 @@
 """The claim on a hand: one process of a user controls it, whatever its environment."""
 
-import fcntl
 import os
 import pwd
 import subprocess
@@ -12,7 +11,6 @@ import pytest
 from holdfast.cli import main
 from holdfast_grip.errors import HandError
 from holdfast_grip.hands import Claim, claim, open_hand
-from holdfast_grip.hands.local import ScalarGripper
 
 CLAIM = """
 import sys
@@ -32,6 +30,13 @@ def folder(tmp_path, monkeypatch):
     """A folder of claims that only the test has."""
     path = tmp_path / "home" / "claims"
     monkeypatch.setattr(claim, "claims_folder", lambda: path)
+    return path
+
+
+def file_of_claim(folder):
+    """The path of the file of a claim on `hand`, which is free now."""
+    with Claim("hand"):
+        (path,) = folder.iterdir()
     return path
 
 
@@ -55,8 +60,7 @@ def test_a_shell_with_another_environment_is_refused(tmp_path, variable):
 
 
 def test_the_claim_of_a_process_that_died_ends_with_it(folder):
-    folder.mkdir(mode=0o700, parents=True)
-    (folder / Claim("hand")._file_name).touch()
+    file_of_claim(folder).touch()
     with Claim("hand"), pytest.raises(HandError, match=OTHER_CONTROLLER), Claim("hand"):
         pass
     assert list(folder.iterdir()) == []
@@ -69,28 +73,11 @@ def test_two_hands_have_two_controllers(folder):
     assert folder.stat().st_mode & 0o777 == 0o700
 
 
-def test_a_file_that_its_owner_removes_meanwhile_is_no_claim(folder, monkeypatch):
-    """Between opening and locking, the last owner releases, and a third process claims."""
-    lock, n_calls = fcntl.flock, []
-
-    def flock(file, how):
-        n_calls.append(file)
-        if len(n_calls) == 1:
-            next(folder.iterdir()).unlink()
-        lock(file, how)
-
-    monkeypatch.setattr(fcntl, "flock", flock)
-    with Claim("hand"), pytest.raises(HandError, match=OTHER_CONTROLLER), Claim("hand"):
-        pass
-    assert len(n_calls) == 3
-
-
 @pytest.mark.parametrize("link", ["file", "folder"])
 def test_a_symbolic_link_is_not_followed(folder, tmp_path, link):
     target = tmp_path / "target"
     if link == "file":
-        folder.mkdir(mode=0o700, parents=True)
-        (folder / Claim("hand")._file_name).symlink_to(target / "claim")
+        file_of_claim(folder).symlink_to(target / "claim")
     else:
         folder.parent.mkdir()
         folder.symlink_to(target)
@@ -142,17 +129,3 @@ class TestResource:
         for uri in ("log:hand", "log:./hand", f"log:{tmp_path}/hand", "log:x/../hand", "log:link"):
             assert open_hand(uri).resource == expected
         assert open_hand("log:other").resource != expected
-
-    def test_a_function_by_any_module(self, tmp_path, monkeypatch):
-        monkeypatch.syspath_prepend(tmp_path)
-        (tmp_path / "claim_hand.py").write_text(
-            "def send(scale): pass\nleft, right = ((lambda scale: side) for side in 'lr')\n"
-        )
-        (tmp_path / "claim_names.py").write_text("from claim_hand import *\ngrip = send\n")
-        names = ("claim_hand:send", "claim_names:send", "claim_names:grip")
-        assert {open_hand(f"call:{name}").resource for name in names} == {
-            f"call:{os.path.realpath(tmp_path / 'claim_hand.py')}:send"
-        }
-        both = {open_hand(f"call:claim_hand:{name}").resource for name in ("left", "right")}
-        assert len(both) == 2
-        assert ScalarGripper(print, "call:x").resource == "call:x"

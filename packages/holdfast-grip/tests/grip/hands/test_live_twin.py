@@ -56,14 +56,3 @@ def test_in_real_time_a_sample_is_not_there_before_it_is_due():
 def test_the_effects_of_a_server_are_refused():
     with pytest.raises(ValueError, match="server=false expected"):
         LiveTwin("twin:?server=true")
-
-
-def test_it_reports_the_joints_of_each_sample_once():
-    with LiveTwin(URI, speed=0) as twin:
-        assert twin.joint_reports() == []
-        for _ in range(5):
-            twin.read(0.0)
-        reports = twin.joint_reports()
-        assert [report.shape for report in reports] == [(16,)] * 5
-        np.testing.assert_array_equal(reports[-1], twin.simulation.world.controller.published)
-        assert twin.joint_reports() == []

@@ -106,16 +106,3 @@ class TestTwoSpeeds:
         one.slides, one.slip_probability = True, 1.0
         (target,) = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 4)][-1:]
         assert target.reason is GripReason.UNSTABLE and target.scale > before + 0.8
-
-    def test_a_grip_that_was_never_stable_is_evaluated_by_what_it_adds(self):
-        law, one = self.calm(probability=0.1)
-        targets = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(1, 90)]
-        assert max(target.scale for target in targets) <= one.scale
-
-    def test_a_hand_that_presses_more_and_carries_its_load_holds(self):
-        law, one = self.calm()
-        one.normal *= 1.3
-        update(law, [one], 2.0 + DT, DT)
-        one.probability = 0.0
-        targets = [update(law, [one], 2.0 + k * DT, DT)[0] for k in range(2, 20)]
-        assert max(target.scale for target in targets) <= one.scale

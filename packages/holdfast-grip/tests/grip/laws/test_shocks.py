@@ -66,11 +66,6 @@ def test_a_slide_is_answered_when_the_blow_is_over():
     assert BLOW_TIME - DT <= late < BLOW_TIME + 4 * DT
 
 
-def test_a_missing_load_is_answered_when_the_blow_is_over():
-    late = first_rise(0.5, blow=0.95, load=0.7)
-    assert BLOW_TIME - DT <= late < BLOW_TIME + 5 * DT
-
-
 @pytest.mark.parametrize(("knows_slips", "longest"), [(True, LONGEST_SHOCK), (False, SHOCK_TIME)])
 def test_a_doubt_that_lasts_is_answered_late(knows_slips, longest):
     late = first_rise(1.5, blow=0.95, knows_slips=knows_slips)

@@ -1,5 +1,4 @@
 import math
-import time as clocks
 from types import SimpleNamespace
 
 import pytest
@@ -20,66 +19,59 @@ def update(*estimates):
 
 
 @pytest.fixture
-def held():
+def clock(monkeypatch):
+    """The time of the host, which a test sets."""
+    now = [100.0]
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
+    return now
+
+
+def started(speed=1.0):
     """A runner whose loop holds an object, its hand, and the time of its newest estimate."""
     tape = Tape()
     controller, time = holding()
-    runner = LoopRunner(GripLoop(controller, tape, armed=True))
+    runner = LoopRunner(GripLoop(controller, tape, armed=True), speed)
     runner.process(update(hand(time)))
     return runner, tape, time
 
 
+@pytest.fixture
+def held(clock):
+    return started()
+
+
 def test_without_a_pace_every_estimate_is_a_step():
-    tape = Tape()
-    controller, time = holding()
-    runner = LoopRunner(GripLoop(controller, tape, armed=True), speed=0.0)
+    runner, tape, time = started(speed=0.0)
     runner.process(update(*(hand(time + k / RATE) for k in range(1, 6))))
-    assert len(tape.commands) == 5
+    assert len(tape.commands) == 6
     assert {command.state for command in tape.commands} == {LoopState.HOLD}
 
 
-def test_silence_is_a_fault(held, monkeypatch):
-    runner, tape, _ = held
-    monkeypatch.setattr("holdfast_grip.loop.runner.time.monotonic", lambda: runner._received + 0.1)
+@pytest.mark.parametrize(("speed", "reason"), [(1.0, GripReason.STALE), (0.1, GripReason.NONE)])
+def test_silence_is_a_fault_by_the_clock_of_the_source(clock, speed, reason):
+    runner, tape, _ = started(speed)
+    clock[0] += 0.1
     runner.process(None)
-    assert tape.commands[-1].reason is GripReason.STALE
+    assert tape.commands[-1].reason is reason
 
 
-def test_a_clock_of_the_source_that_stands_still_is_a_fault(held, monkeypatch):
+def test_a_clock_of_the_source_that_stands_still_is_a_fault(held, clock):
     # The samples are new, but by their times they are not: an assembler makes them just increase.
     runner, tape, time = held
-    now = runner._received
-    monkeypatch.setattr("holdfast_grip.loop.runner.time.monotonic", lambda: now)
     for _ in range(20):
-        now += 0.01
+        clock[0] += 0.01
         time = math.nextafter(time, math.inf)
         runner.process(update(hand(time)))
     assert tape.commands[-1].reason is GripReason.STALE
 
 
-def test_silence_counts_by_the_clock_of_a_slow_source(held, monkeypatch):
-    runner, tape, _ = held
-    runner._speed = 0.1
-    monkeypatch.setattr("holdfast_grip.loop.runner.time.monotonic", lambda: runner._received + 0.1)
-    runner.process(None)
-    assert tape.commands[-1].state is LoopState.HOLD
-
-
-def test_an_estimate_that_is_later_than_a_tick_is_no_fault_of_the_clock(held, monkeypatch):
+def test_an_estimate_that_is_later_than_a_tick_is_no_fault_of_the_clock(held, clock):
     runner, tape, time = held
-    monkeypatch.setattr("holdfast_grip.loop.runner.time.monotonic", lambda: runner._received + 0.01)
+    clock[0] += 0.01
     runner.process(None)
     runner.process(update(hand(time + 1 / RATE)))
     runner.process(update(hand(time + 2 / RATE)))
     assert {command.state for command in tape.commands} == {LoopState.HOLD}
-
-
-@pytest.fixture
-def clock(held, monkeypatch):
-    """The time of the host, which a test sets."""
-    now = [held[0]._received]
-    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now[0]))
-    return now
 
 
 class TestBehind:
@@ -121,7 +113,7 @@ class TestBehind:
 
     def test_a_pause_of_the_loop_is_a_fault(self, held, clock):
         runner, tape, time = held
-        clock[0] = runner._stepped_at + module.MAX_PAUSE - 0.001
+        clock[0] += module.MAX_PAUSE - 0.001
         runner.process(update(hand(time + 1 / RATE)))
         assert tape.commands[-1].state is LoopState.HOLD
         clock[0] += module.MAX_PAUSE + 0.001
@@ -130,13 +122,15 @@ class TestBehind:
 
     def test_what_is_pending_is_bounded(self, held):
         runner, _, time = held
+        followed, runner.loop.follow = [], lambda _, time: followed.append(time)
         for k in range(3 * module.MAX_PENDING):
             runner.put(update(hand(time + k / RATE)))
-        assert len(runner._pending) == module.MAX_PENDING
+        runner.run(lambda: True)
+        assert len(followed) == module.MAX_PENDING - 1
 
     def test_the_age_of_an_estimate_counts_from_the_arrival_of_its_samples(self, held):
         runner, tape, time = held
-        arrival = Arrival(time + 1 / RATE, {}, clocks.monotonic() - 0.08)
+        arrival = Arrival(time + 1 / RATE, {}, module.time.monotonic() - 0.08)
         runner.process(update(hand(time + 1 / RATE))._replace(arrival=arrival))
         assert tape.commands[-1].reason is GripReason.STALE
 

@@ -82,10 +82,6 @@ class TestModules:
         assert arrival.time == 0.002
         np.testing.assert_array_equal(arrival.samples["tip"], np.ones((9, 3)))
 
-    def test_a_sensor_that_is_off_is_left_out(self):
-        first = uskin(0), uskin(0, 2, "not_available", 0)
-        assert list(identified(*first).sensors) == ["finger1"]
-
     @pytest.mark.parametrize(
         ("message", "given", "text"),
         [
@@ -127,13 +123,6 @@ class TestTimes:
         times = [a.time - EPOCH for a in arrivals if a.samples]
         np.testing.assert_allclose(times, [0.01 * k for k in range(10) if k != 4], atol=1e-6)
 
-    def test_a_message_without_time_among_others_with(self):
-        assembler = identified(uskin(0), uskin(0, 2))
-        (arrival,) = assembler.assemble([uskin(1), uskin(1, 2)._replace(time=None)], 50.0)
-        assert set(arrival.samples) == {"finger1", "finger2"}
-        (arrival,) = assembler.assemble([uskin(2)._replace(time=None)], 50.01)
-        assert (arrival.samples, arrival.n_refused) == ({}, 1)
-
 
 class TestPackets:
     def test_repeated_packets_are_no_samples_but_a_new_stamp_is(self):
@@ -161,9 +150,3 @@ def test_a_device_that_changes_has_a_fault(unit, later):
     (arrival,) = assembler.assemble([later, uskin(1, 2, forces=16)], 50.0)
     assert set(arrival.samples) == {"finger2"}
     assert arrival.faults == {"finger1": (Fault.TAXEL_COUNT,)}
-
-
-def test_a_device_that_is_new_is_named():
-    (arrival,) = identified(uskin(0)).assemble([uskin(1), uskin(1, 2)], 50.0)
-    assert set(arrival.samples) == {"finger1"}
-    assert "sensor 2" in arrival.notices[0]
