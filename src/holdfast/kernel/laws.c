@@ -163,7 +163,8 @@ static bool hf_has_stuck_axis(const hf_finger *f, const hf_scan *scan, bool is_w
         return false; /* as usual */
     }
     const hf_real least = HF_FROZEN_SECONDS / f->hand->period;
-    const size_t n_least = f->n_taxels < HF_MIN_VARYING ? f->n_taxels : HF_MIN_VARYING;
+    const size_t n_least =
+        f->n_taxels < HF_MIN_VARYING ? f->n_taxels : (size_t)HF_MIN_VARYING;
     bool is_stuck = false;
     w->is_resting = false;
     for (size_t axis = 0; axis < 3; ++axis) {
