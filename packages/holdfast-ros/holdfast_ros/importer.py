@@ -87,8 +87,8 @@ def read(
         RecordingError: it is damaged or has no known topic.
     """
     with open_bag(path) as bag:
-        bag_import = _BagImport(path, bag)
-        if not sensors and not columns:
+        bag_import = None if sensors or columns else _BagImport(path, bag)
+        if bag_import is not None:
             if bag_import.topics:
                 yield bag_import.recording(report)
                 return
@@ -102,7 +102,7 @@ def read(
     except ProposalError:
         raise
     except RecordingError as cause:
-        if sensors or columns:
+        if bag_import is None:
             raise
         raise bag_import.no_topic() from cause
 

@@ -322,8 +322,8 @@ def _propose_for_arrays(layout: Layout) -> None:
     ]
     taxels = [shape for shape in readings if len(shape) in (2, 3) and shape[-1] == len("xyz")]
     flat = [shape for shape in readings if len(shape) == 2 and shape[1] in sizes]
-    for shape in (taxels + flat)[:1]:
-        layout.propose_sensor(prod(shape[1:]) // len("xyz"), None)
+    if shapes := taxels + flat:
+        layout.propose_sensor(prod(shapes[0][1:]) // len("xyz"), None)
         return
     first = max(layout.arrays, key=lambda name: prod(layout.arrays[name].shape), default="PATH")
     slash = "/" if layout.source.option == "--topic" else ""
