@@ -14,7 +14,6 @@ ROLES = {
     "vigorous": "a more vigorous profile of the twin",
     "glitch-0": "other objects, without glitches of the hand's controller",
     "glitch-1": "other objects, with 1 glitch a minute",
-    "glitch-7": "other objects, with 7 glitches a minute",
     "aged": "other objects, skins aged by four months",
     "impacts": "other objects; hand, arm and object are knocked",
     "slips": "other objects, slips that no push causes",

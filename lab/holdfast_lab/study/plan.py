@@ -113,13 +113,13 @@ class StudyPlan(msgspec.Struct, frozen=True):
     Attributes:
         corpora: by role: "main" always, and of the following those that exist: "fresh" (the same
             objects, other seeds), "others" (other objects), "gentle" and "vigorous" (other
-            profiles), "glitch-0", "glitch-1" and "glitch-7" (other objects, with so many glitches
-            of the hand's controller a minute), "aged" (other objects, skins aged by four months),
-            "impacts" (other objects, the hand and its object are knocked), "slips" (other objects,
-            slips that no push causes), and "taught" (what a user would record to teach a hand).
+            profiles), "glitch-0" and "glitch-1" (other objects, with so many glitches of the hand's
+            controller a minute), "aged" (other objects, skins aged by four months), "impacts"
+            (other objects, the hand and its object are knocked), "slips" (other objects, slips that
+            no push causes), and "taught" (what a user would record to teach a hand).
         real: recordings of a real hand; None if there are none.
         quick: fewer windows, methods and trials.
-        full: with the parts beyond the paper's tables, events and splits.
+        full: with slips of fingers and the models that ship.
         seed: of all random numbers.
     """
 

@@ -51,7 +51,7 @@ PARTS = {
 }
 """The parts of the study, by name."""
 ONLY_FULL = ("slips", "shipped")
-"""Those beyond the paper's tables, events and splits. A quick study has them at a small size."""
+"""Those beyond the paper and the comparison. A quick study has them at a small size."""
 
 
 def run_study(

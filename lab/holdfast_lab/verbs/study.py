@@ -27,8 +27,8 @@ def study(
         bool,
         typer.Option(
             "--full",
-            help="Also slips of fingers, and the models that ship: on knocks, aged skins and slips "
-            "by speed, untaught and taught.",
+            help="Also other profiles of the twin and rates of glitches, slips of fingers, and the "
+            "models that ship: on knocks, aged skins and slips by speed, untaught and taught.",
         ),
     ] = False,
     parallel: EngineOptions,

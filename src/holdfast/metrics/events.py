@@ -24,7 +24,7 @@ from holdfast.contact import (
 )
 from holdfast.metrics.alarms import first_alarms, outside
 from holdfast.metrics.decisions import Codes, FingerDecisions, check_lengths, check_times
-from holdfast.metrics.masks import runs
+from holdfast.metrics.masks import Mask, runs
 from holdfast.metrics.statistics import finite_or_none, percent, quantile
 from holdfast.metrics.truth_labels import Onsets, common_onsets
 from holdfast.sensors.types import Array
@@ -269,46 +269,102 @@ def match_alarms(times: npt.ArrayLike, labels: npt.ArrayLike, states: npt.ArrayL
         >>> [round(time, 2) for time in event]
         [1.0, 2.0, 1.03]
     """
-    time = np.asarray(times, dtype=np.float64)
-    label, state = np.asarray(labels, dtype=np.int8), np.asarray(states, dtype=np.int8)
-    check_lengths(times=time, labels=label, states=state)
-    check_times(time)
-    stable, unstable = _spans(label == STABLE, time), _spans(_not_stable(label), time)
-    # Gaps are closed before the runs are measured: a shake that leaves the finger for a moment is
-    # one event, and its parts alone would be too short. So the end of a run counts only if the next
-    # begins late enough, and the beginning only if the run before ended early enough.
-    wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
-    first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
-    onsets, ends = unstable[first, 0], unstable[last, 1]
-    # An alarm needs a detector that was STABLE before, so an event needs a hold in which it can be.
-    held = stable[stable[:, 1] - stable[:, 0] >= MIN_STABLE_DURATION - TIME_TOLERANCE]
-    is_long = ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE
-    events = np.column_stack([onsets, ends])[is_long & np.isin(onsets, held[:, 1])]
-    windows = alarm_windows(events)
-    alarms = alarm_indices(state)
-    first = first_alarms(time, alarms, windows)[0]
-    others = alarms[outside(time, windows)[alarms]]
-    # An alarm where nothing is labelled is neither right nor wrong.
-    false = others[label[others] != UNKNOWN]
-    return AlarmMatch(
-        tuple(
-            InstabilityEvent(onset, end, alarm if math.isfinite(alarm) else None)
-            for (onset, end), alarm in zip(events.tolist(), first.tolist(), strict=True)
-        ),
-        tuple(FalseAlarm(float(time[k]), _STATES[label[k]]) for k in false),
-        _duration(label == STABLE, time),
-        n_unlabelled=len(others) - len(false),
-        held=_held_time(time, label, state, alarm_windows(unstable)),
-    )
+    return LabelledEvents.of(times, labels).match(states)
 
 
-def _held_time(times: Array, labels: Codes, states: Codes, disturbances: Array) -> HeldTime:
-    held, is_unstable = np.isin(labels, (STABLE, UNSTABLE)), states == UNSTABLE
-    rises = np.flatnonzero(is_unstable[1:] & ~is_unstable[:-1]) + 1
-    calm = (labels == STABLE) & outside(times, disturbances)
-    return HeldTime(
-        _duration(held, times), _duration(held & is_unstable, times), int(calm[rises].sum())
-    )
+@dataclass(frozen=True, eq=False)
+class LabelledEvents:
+    """The events in the labels of one finger, or hand, in one recording; see `match_alarms`.
+
+    States at many thresholds are matched with the same events.
+
+    Attributes:
+        times: (n,) [s].
+        labels: (n,) codes.
+        events: (n_events, 2) onset and end [s].
+        stable_seconds: duration of stable labels [s].
+        is_held: (n,) labels STABLE and UNSTABLE.
+        held_seconds: duration of these labels [s].
+        is_calm: (n,) stable labels at which no alarm would belong to a run of not-stable labels.
+        instants: (n + 1,) the times, and the end of the last sample [s].
+    """
+
+    times: Array
+    labels: Codes
+    events: Array
+    stable_seconds: float
+    is_held: Mask
+    held_seconds: float
+    is_calm: Mask
+    instants: Array
+
+    @classmethod
+    def of(cls, times: npt.ArrayLike, labels: npt.ArrayLike) -> Self:
+        """Find the events in labels.
+
+        Raises:
+            ValueError: the shapes differ, or the times do not increase.
+        """
+        time, label = np.asarray(times, dtype=np.float64), np.asarray(labels, dtype=np.int8)
+        check_lengths(times=time, labels=label)
+        check_times(time)
+        period = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+        instants = np.append(time, time[-1:] + period)
+        is_held = np.isin(label, (STABLE, UNSTABLE))
+        stable, unstable = instants[runs(label == STABLE)], instants[runs(_not_stable(label))]
+        # Gaps are closed before the runs are measured: a shake that leaves the finger for a moment
+        # is one event, and its parts alone would be too short. So the end of a run counts only if
+        # the next begins late enough, and the beginning only if the run before ended early enough.
+        wide = unstable[1:, 0] - unstable[:-1, 1] >= MIN_GAP_DURATION - TIME_TOLERANCE
+        first, last = np.append(True, wide)[: len(unstable)], np.append(wide, True)[: len(unstable)]
+        onsets, ends = unstable[first, 0], unstable[last, 1]
+        # An alarm needs a detector that was STABLE before, so an event needs a hold in which it can
+        # be.
+        held = stable[stable[:, 1] - stable[:, 0] >= MIN_STABLE_DURATION - TIME_TOLERANCE]
+        is_long = ends - onsets >= MIN_EVENT_DURATION - TIME_TOLERANCE
+        return cls(
+            time,
+            label,
+            np.column_stack([onsets, ends])[is_long & np.isin(onsets, held[:, 1])],
+            _seconds(stable),
+            is_held,
+            _seconds(instants[runs(is_held)]),
+            (label == STABLE) & outside(time, alarm_windows(unstable)),
+            instants,
+        )
+
+    def match(self, states: npt.ArrayLike) -> AlarmMatch:
+        """Return the events, each with its alarm, and the false alarms of (n,) decided states.
+
+        Raises:
+            ValueError: the shapes differ.
+        """
+        state = np.asarray(states, dtype=np.int8)
+        check_lengths(times=self.times, labels=self.labels, states=state)
+        windows, alarms = alarm_windows(self.events), alarm_indices(state)
+        first = first_alarms(self.times, alarms, windows)[0]
+        others = alarms[outside(self.times, windows)[alarms]]
+        # An alarm where nothing is labelled is neither right nor wrong.
+        false = others[self.labels[others] != UNKNOWN]
+        return AlarmMatch(
+            tuple(
+                InstabilityEvent(onset, end, alarm if math.isfinite(alarm) else None)
+                for (onset, end), alarm in zip(self.events.tolist(), first.tolist(), strict=True)
+            ),
+            tuple(FalseAlarm(float(self.times[k]), _STATES[self.labels[k]]) for k in false),
+            self.stable_seconds,
+            n_unlabelled=len(others) - len(false),
+            held=self._held_time(state == UNSTABLE),
+        )
+
+    def _held_time(self, is_unstable: Mask) -> HeldTime:
+        rises = np.flatnonzero(is_unstable[1:] & ~is_unstable[:-1]) + 1
+        unstable = self.instants[runs(self.is_held & is_unstable)]
+        return HeldTime(self.held_seconds, _seconds(unstable), int(self.is_calm[rises].sum()))
+
+
+def _seconds(spans: Array) -> float:
+    return float((spans[:, 1] - spans[:, 0]).sum())
 
 
 def alarm_windows(events: Array) -> Array:
@@ -388,17 +444,5 @@ def event_delays(matches: Sequence[AlarmMatch]) -> Array:
 _STATES = tuple(ContactState)
 
 
-def _not_stable(codes: Codes) -> npt.NDArray[np.bool_]:
-    return np.isin(codes, (UNSTABLE, NO_CONTACT))
-
-
-def _duration(mask: npt.NDArray[np.bool_], times: Array) -> float:
-    spans = _spans(mask, times)
-    return float((spans[:, 1] - spans[:, 0]).sum())
-
-
-def _spans(mask: npt.NDArray[np.bool_], times: Array) -> Array:
-    """Return (m, 2) start and end [s] of each run of True."""
-    period = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    instants = np.append(times, times[-1:] + period)
-    return instants[runs(mask)]
+def _not_stable(codes: Codes) -> Mask:
+    return (codes == UNSTABLE) | (codes == NO_CONTACT)

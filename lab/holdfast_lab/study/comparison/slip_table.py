@@ -31,9 +31,9 @@ QUICK_SLIP_METHODS = ("holdfast", "holdfast_stability", "slip_servo", "jl_local_
 """Methods of a quick study."""
 TESTED_ROLES = ("others", "fresh")
 """Roles of the corpora on which the methods are tested, where they exist."""
-TASK_SECONDS = {"jl_local_svm": 300.0, "jl_global_svm": 400.0, "holdfast_trees": 200.0}
+TASK_SECONDS = {"holdfast_trees": 60.0, "trees": 40.0}
 """Approximate duration of the slow tasks [s]."""
-OTHER_SECONDS = 60.0
+OTHER_SECONDS = 20.0
 """Approximate duration of the other tasks [s]."""
 FITTED_TO, METHOD, BUDGET = "fitted to", "method", "budget"
 HELD_BUDGET, QUIET_BUDGET = f"{SLIP_RATE:g}/min held", f"{SLIP_RATE:g}/min quiet"

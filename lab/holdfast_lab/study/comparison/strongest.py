@@ -20,11 +20,7 @@ from holdfast_lab.study.comparison.jobs import (
     method_titles,
 )
 from holdfast_lab.study.comparison.rows import correct_and_all, quotient_row, ratio_row
-from holdfast_lab.study.evaluation.alarms import (
-    EVENT,
-    FALSE_ALARM,
-    LEFT_OUT,
-)
+from holdfast_lab.study.evaluation.alarm_labels import EVENT, FALSE_ALARM, LEFT_OUT
 from holdfast_lab.study.evaluation.evaluate_method import (
     COMPARED,
     COMPARED_RATE,

@@ -1,9 +1,4 @@
-"""Alarms of a hand: which are false, which are of a glitch, and at which threshold they are few.
-
-The paper counts the detection of a glitch of the hand's controller as a success. For a user it is
-a false alarm, because nothing but the hand itself moved the object. So every table of events has
-both readings. In a third one glitches are left out.
-"""
+"""Alarms of a hand: which are false, which are of a glitch, and at which threshold they are few."""
 
 from collections.abc import Sequence
 from typing import NamedTuple, Self
@@ -11,55 +6,12 @@ from typing import NamedTuple, Self
 import msgspec
 import numpy as np
 
-from holdfast.contact import NO_CONTACT, STABLE, TIME_TOLERANCE, UNSTABLE
-from holdfast.metrics import match_alarms
+from holdfast.contact import NO_CONTACT, TIME_TOLERANCE, UNSTABLE
 from holdfast.metrics.alarms import outside
-from holdfast.metrics.decisions import Codes
 from holdfast.metrics.events import EARLY_TOLERANCE, alarm_windows
-from holdfast.metrics.masks import Mask, runs
-from holdfast.metrics.slip_truth import sample_durations
 from holdfast.sensors.types import Array
+from holdfast_lab.study.evaluation.alarm_labels import AlarmLabels
 from holdfast_lab.study.evaluation.fitted_method import Scores
-from holdfast_lab.study.evaluation.recording_features import RecordingFeatures, label_hand
-
-EVENT = "an event"
-FALSE_ALARM = "a false alarm"
-LEFT_OUT = "left out"
-READINGS = (EVENT, FALSE_ALARM, LEFT_OUT)
-"""Readings by the words that stand for them in tables, under "a glitch is"."""
-
-
-class AlarmLabels(NamedTuple):
-    """Labels by which the alarms of a hand, or a finger, are counted.
-
-    Attributes:
-        labels: (n,) label codes.
-        glitch: (n,) samples at which an alarm is one of a glitch.
-        left_out: (n,) samples at which neither an alarm nor a stable label is counted.
-    """
-
-    labels: Codes
-    glitch: Mask
-    left_out: Mask
-
-
-def labels_by_reading(recording: RecordingFeatures) -> dict[str, AlarmLabels]:
-    """Return the exact labels of the hand for each of `READINGS`.
-
-    In an event a glitch is unstable; otherwise it is stable, unless something else happens.
-    """
-    event = label_hand(recording.times, recording.exact_labels)
-    other = label_hand(recording.times, recording.calm_labels)
-    glitch = runs(event.labels != other.labels)
-    ends = event.times + sample_durations(event.times)
-    spans = np.column_stack([event.times[glitch[:, 0]], ends[glitch[:, 1] - 1]])
-    near = ~outside(event.times, alarm_windows(spans))
-    nowhere = np.zeros_like(near)
-    return {
-        EVENT: AlarmLabels(event.labels, near, nowhere),
-        FALSE_ALARM: AlarmLabels(other.labels, near, nowhere),
-        LEFT_OUT: AlarmLabels(other.labels, nowhere, near),
-    }
 
 
 class AlarmStatistics(msgspec.Struct, frozen=True):
@@ -91,12 +43,10 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
             shift: of the threshold [log odds].
         """
         times, states = scores.times, scores.states(shift)
-        match = match_alarms(times, labels.labels, states)
+        match = labels.events.match(states)
         at = np.searchsorted(times, [alarm.time for alarm in match.false_alarms])
         at = at[~labels.left_out[at]]
-        is_stable = labels.labels[at] == STABLE
-        # Time in which no alarm is counted must not dilute the rate of the others.
-        left_out = sample_durations(times)[(labels.labels == STABLE) & labels.left_out]
+        is_stable = labels.stable[at]
         # The state just before the first time at which an alarm belongs to the onset.
         onsets = np.array([event.onset for event in match.events])
         before = np.searchsorted(times, onsets - EARLY_TOLERANCE - TIME_TOLERANCE) - 1
@@ -108,7 +58,7 @@ class AlarmStatistics(msgspec.Struct, frozen=True):
             n_false_alarms=len(at),
             n_under_stable=int(is_stable.sum()),
             n_of_glitch=int((is_stable & labels.glitch[at]).sum()),
-            stable_seconds=match.stable_seconds - float(left_out.sum()),
+            stable_seconds=labels.counted_seconds,
         )
 
     def n_missed(self, post: float) -> int:
@@ -142,17 +92,13 @@ class FalseAlarmRanges(NamedTuple):
             scores: held as long as those at which the chosen threshold is used.
             labels: of the same samples.
         """
-        times, stable = scores.times, labels.labels == STABLE
-        match = match_alarms(times, labels.labels, labels.labels)
-        spans = np.array([(event.onset, event.end) for event in match.events]).reshape(-1, 2)
         # An alarm near an event belongs to the event, whatever the threshold.
-        counted = stable & ~labels.left_out & outside(times, alarm_windows(spans))
-        seconds = match.stable_seconds
-        seconds -= float(sample_durations(times)[stable & labels.left_out].sum())
+        near = ~outside(scores.times, alarm_windows(labels.events.events))
+        counted = labels.stable & ~labels.left_out & ~near
         after = np.where(scores.known & ~scores.grasped, -np.inf, scores.margin)
         before = np.where(scores.known & scores.grasped, scores.margin, -np.inf)
         rows = np.flatnonzero(counted[1:] & (before[:-1] > after[1:]))
-        return cls(after[rows + 1], before[rows], seconds / 60)
+        return cls(after[rows + 1], before[rows], labels.counted_seconds / 60)
 
 
 def threshold_shift(ranges: Sequence[FalseAlarmRanges], per_minute: float) -> float:

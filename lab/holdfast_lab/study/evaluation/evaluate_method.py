@@ -22,12 +22,10 @@ from holdfast.recordings import Recording, Tactile
 from holdfast.sensors import sensor
 from holdfast.training.classifiers.folds import deal_folds, random_folds, shuffled
 from holdfast.training.splits import RANDOM_FOLDS
+from holdfast_lab.study.evaluation.alarm_labels import EVENT, READINGS
 from holdfast_lab.study.evaluation.alarms import (
-    EVENT,
-    READINGS,
     AlarmStatistics,
     FalseAlarmRanges,
-    labels_by_reading,
     threshold_shift,
 )
 from holdfast_lab.study.evaluation.fitted_method import (
@@ -265,7 +263,7 @@ def _fit_fold(
         for recording in (training.recordings[chosen[k]] for k in sorted(fold)):
             scores = fitted.scores(recording).hand.hold(HOLD_TIME)
             # A fit without the recording: on its own fit a recording has too few false alarms.
-            for reading, labels in labels_by_reading(recording).items():
+            for reading, labels in recording.alarm_labels.items():
                 ranges[reading].append(FalseAlarmRanges.of(scores, labels))
     shifts = {
         reading: {
@@ -288,7 +286,7 @@ def summarise_recordings(scored: Sequence[ScoredRecording]) -> MethodEvaluation:
     }
     for case in scored:
         lasting = case.hand.hold(HOLD_TIME)
-        for reading, labels in labels_by_reading(case.recording).items():
+        for reading, labels in case.recording.alarm_labels.items():
             alarms[reading][OWN].append(AlarmStatistics.of(case.hand, labels))
             for name, shift in {LASTING: 0.0, **case.shifts[reading]}.items():
                 alarms[reading][name].append(AlarmStatistics.of(lasting, labels, shift))

@@ -26,7 +26,7 @@ from holdfast.training.finger_samples import (
     thinning_step,
     usable_rows,
 )
-from holdfast_lab.classifiers import Classifier
+from holdfast_lab.classifiers import Classifier, ungrouped
 from holdfast_lab.study.evaluation.recording_features import RecordingFeatures
 from holdfast_lab.study.methods import HAND, Method
 
@@ -114,7 +114,7 @@ class MethodTraining:
             # A unit with one class gets no classifier, and its scores are NaN.
             if not trained.one_class:
                 recipe = self.method.recipe
-                classifiers[unit] = recipe.fit(trained, self.method.reference, self.seed)
+                classifiers[unit] = recipe.fit(ungrouped(trained), self.method.reference, self.seed)
         rest = [self.recordings[index].at_rest for index in fitted_to]
         fingers = dict.fromkeys(finger for moments in rest for finger in moments)
         # A finger that a recording lacks adds nothing to its moments in the others.
@@ -224,7 +224,7 @@ class ScoredRecording(NamedTuple):
     """A recording and its scores by a fitted method.
 
     Attributes:
-        recording: without its features, to save memory.
+        recording: that is scored.
         fingers: those of a whole-hand method have the latest margin of the hand.
         hand: at every time of any finger.
         whole_hand: whether the method decides for the hand only.
@@ -298,8 +298,7 @@ class FittedMethod:
         hand = Scores.of_hand(fingers.values())
         if HAND in margins:
             hand = score(HAND, hand.times, hand.grasped)
-        scored = replace(recording, features={})
-        return ScoredRecording(scored, fingers, hand, HAND in margins, self.shifts, self.fold)
+        return ScoredRecording(recording, fingers, hand, HAND in margins, self.shifts, self.fold)
 
 
 def _log_odds(probability: npt.ArrayLike) -> Any:  # noqa: ANN401 (an array or a number, as given)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from operator import attrgetter
 from typing import Any, NamedTuple, Self
 
@@ -26,6 +26,7 @@ from holdfast.metrics.truth_labels import LabelRule, labels_by_truth
 from holdfast.recordings import Recording, Truth, cut_labels, label_states
 from holdfast.sensors.types import Array
 from holdfast.training.training_samples import rest_moments
+from holdfast_lab.study.evaluation.alarm_labels import AlarmLabels, labels_by_reading
 from holdfast_lab.study.kept import WORKER_MEMORY
 from holdfast_lab.study.methods import HAND, HandSignal, Method, hand_signal
 from holdfast_lab.study.plan import Corpus
@@ -118,6 +119,12 @@ class RecordingFeatures:
             for name, truth in self.slips.items()
         }
         return replace(self, slips=slips, **changed)
+
+    @cached_property
+    def alarm_labels(self) -> dict[str, AlarmLabels]:
+        """Exact labels of the hand by which alarms are counted, for each of `READINGS`."""
+        event, calm = (label_hand(self.times, x) for x in (self.exact_labels, self.calm_labels))
+        return labels_by_reading(event, calm)
 
     def unit_labels(self, unit: str) -> Codes:
         """Return the labels that train a unit: for the hand, at the times of the first finger."""

@@ -18,7 +18,7 @@ from holdfast.training.classifiers import RECIPES, Parameters, Recipe, Samples
 from holdfast.training.finger_samples import thin, thinning_step
 from holdfast.training.setting import SEARCH_SAMPLES
 from holdfast.training.splits import inner_folds
-from holdfast_lab.classifiers import Classifier, StudyRecipe
+from holdfast_lab.classifiers import Classifier, StudyRecipe, ungrouped
 from holdfast_lab.classifiers.threshold import Threshold
 from holdfast_lab.report.result_tables import Row
 from holdfast_lab.study.paper.pooled_samples import SamplePool, pool_samples
@@ -203,7 +203,7 @@ class _Fit:
     seed: int
 
     def __call__(self, samples: Samples) -> Classifier:
-        selected = _ungrouped(thin(samples, self.n_fit))
+        selected = ungrouped(thin(samples, self.n_fit))
         return self.recipe.fit(selected, self.parameters, self.seed)
 
     def out_of_fold(
@@ -216,11 +216,6 @@ class _Fit:
                 self(samples.take(~left_out)), samples.take(left_out), n_recordings
             )
         return counts
-
-
-def _ungrouped(samples: Samples) -> Samples:
-    """Return the samples as one group: the paper treats them as independent of each other."""
-    return samples._replace(groups=np.zeros_like(samples.groups))
 
 
 def _evaluate(
@@ -241,7 +236,7 @@ def _evaluate(
     parameters: Parameters = {}
     if isinstance(recipe, FixedWeights):
         # The masks are thinned by the step by which `thin` takes the samples.
-        few = _ungrouped(thin(train, SEARCH_SAMPLES))
+        few = ungrouped(thin(train, SEARCH_SAMPLES))
         step = thinning_step(len(folds), SEARCH_SAMPLES)
         masks = [folds[::step] == fold for fold in range(N_FOLDS)]
         parameters = search(few, masks, recipe, budget.trials, seed)

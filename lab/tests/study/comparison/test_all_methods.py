@@ -30,7 +30,8 @@ def plan(tmp_path_factory):
         "main": range(4),
         "others": range(10, 13),
         "gentle": range(20, 22),
-        "glitch-1": range(30, 32),
+        "glitch-0": range(30, 32),
+        "glitch-1": range(40, 42),
     }
     folder = tmp_path_factory.mktemp("comparison")
     return StudyPlan(corpora_of(folder, seeds, recording_with_truth))

@@ -5,14 +5,11 @@ import pytest
 
 from holdfast.contact import NO_CONTACT, STABLE, UNKNOWN, UNSTABLE
 from holdfast.metrics import match_alarms
+from holdfast.metrics.events import LabelledEvents
+from holdfast_lab.study.evaluation.alarm_labels import EVENT, FALSE_ALARM, LEFT_OUT, AlarmLabels
 from holdfast_lab.study.evaluation.alarms import (
-    EVENT,
-    FALSE_ALARM,
-    LEFT_OUT,
-    AlarmLabels,
     AlarmStatistics,
     FalseAlarmRanges,
-    labels_by_reading,
     threshold_shift,
 )
 from holdfast_lab.study.evaluation.fitted_method import Scores
@@ -29,9 +26,10 @@ def statistics(states, labels):
 
 
 def labels_of(codes):
-    """Labels without glitches."""
+    """Labels at 150 Hz, without glitches."""
     nowhere = np.zeros(len(codes), dtype=bool)
-    return AlarmLabels(codes, nowhere, nowhere)
+    events = LabelledEvents.of(np.arange(len(codes)) / 150, codes)
+    return AlarmLabels(events, nowhere, nowhere)
 
 
 def where(*spans):
@@ -45,9 +43,8 @@ def readings(*spans):
     labels = np.where(glitch, UNSTABLE, where(*spans)).astype(np.int8)
     recording = recording_at({"thumb": TIMES})
     calm = np.where(glitch, STABLE, labels).astype(np.int8)
-    return labels_by_reading(
-        replace(recording, exact_labels={"thumb": labels}, calm_labels={"thumb": calm})
-    )
+    labelled = replace(recording, exact_labels={"thumb": labels}, calm_labels={"thumb": calm})
+    return labelled.alarm_labels
 
 
 def test_kinds_of_false_alarms_are_counted():
