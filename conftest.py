@@ -15,8 +15,9 @@ import pytest
 # all others again, which takes most of the time of the suite; so would pytest with the tests.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-# The workers of pytest-xdist use the processors already; threads of OpenBLAS that wait take time.
+# The workers of pytest-xdist use the processors already; further threads that wait take time.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 for _signal, _handler in (
     (signal.SIGINT, signal.default_int_handler),

@@ -93,7 +93,8 @@ def glitch_rates(plan: StudyPlan, results: Results) -> ResultTable:
         "The rate of glitches is a free choice of the twin. Grasps of unseen objects with 0 "
         "and 1 glitches a minute, and with 7 ('unseen objects'); methods and thresholds are fitted "
         "to main, as everywhere. The grasps of different rates are not the same draws. At the "
-        f"threshold for {COMPARED_RATE:g} false alarm per minute under a stable label in training. {GLITCH_NOTE}"
+        f"threshold for {COMPARED_RATE:g} false alarm per minute under a stable label in training. "
+        f"{GLITCH_NOTE}"
     )
     lines = ("on", READING, "method")
     title = "Sensitivity to the rate of glitches"

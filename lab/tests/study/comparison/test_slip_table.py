@@ -60,7 +60,7 @@ def test_a_line_has_each_figure_with_its_interval():
     assert {row.n for row in rows.values()} == {6}
 
 
-@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 24)])
+@pytest.mark.parametrize(("quick", "n"), [(True, len(QUICK_SLIP_METHODS)), (False, 17)])
 def test_each_method_has_a_task_and_lines(quick, n):
     plan = StudyPlan({"main": corpus("main"), "others": corpus("others")}, quick=quick)
     made = tasks(plan)
