@@ -53,7 +53,7 @@ class GradientBoosting:
 
     reference: Parameters = field(
         default_factory=lambda: {
-            "n_trees": 150,
+            "n_trees": 100,
             "learning_rate": 0.1,
             "n_leaves": 15,
             "leaf_samples": 50,

@@ -22,7 +22,7 @@ QUICK_METHODS = (*PAPER_FAMILY, "holdfast")
 """Those of them that a quick study evaluates on every corpus."""
 SLOW_METHODS = ("jl_local_svm", "jl_global_svm")
 """Methods that a quick study leaves out."""
-METHOD_SECONDS = {"trees": 100.0, "jl_local_svm": 40.0, "jl_global_svm": 60.0}
+METHOD_SECONDS = {"trees": 80.0, "jl_local_svm": 40.0, "jl_global_svm": 60.0}
 """Approximate duration of the slow evaluations [s]."""
 DEFAULT_SECONDS = 20.0
 """Approximate duration of the other evaluations [s]."""
