@@ -1,11 +1,13 @@
 """Values that a worker keeps in memory, because many tasks of a study use them."""
 
+import math
 import os
 from collections.abc import Callable, Hashable
 from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
 
+from holdfast.errors import is_installed
 from holdfast.recordings import Recording
 from holdfast_lab.report.environment import physical_memory
 
@@ -79,5 +81,16 @@ def usable_memory(limit: Path = CONTAINER_LIMIT) -> int:
     return min(memory, int(text)) if text.isdecimal() else memory
 
 
-WORKER_MEMORY = KeptValues(MEMORY_SHARE * usable_memory() / (os.cpu_count() or 1))
+def worker_memory() -> KeptValues:
+    """Return the memory of this process for kept values, and let the process grow by it."""
+    if is_installed("joblib"):
+        from joblib.externals.loky import process_executor
+
+        # loky takes a worker that grows by 300 MB for one that leaks, and replaces it with all that
+        # it keeps. Where the limit has another name, workers read recordings again and again.
+        process_executor._MAX_MEMORY_LEAK_SIZE = math.inf
+    return KeptValues(MEMORY_SHARE * usable_memory() / (os.cpu_count() or 1))
+
+
+WORKER_MEMORY = worker_memory()
 """The values that this process keeps."""

@@ -1,6 +1,10 @@
 """Values that a worker keeps: the same ones again, up to a number of bytes."""
 
+import math
+from pathlib import Path
+
 import pytest
+from joblib.externals.loky import process_executor
 
 from holdfast_lab.study.evaluation.recording_features import prepared_recordings
 from holdfast_lab.study.kept import KeptValues
@@ -25,6 +29,12 @@ def test_what_does_not_fit_is_made_again_and_what_fits_stays():
     for key in "abcabc":
         kept.get(key, lambda key=key: made.append(key), one_byte)
     assert made == ["a", "b", "c", "c"]
+
+
+def test_a_worker_may_grow_by_what_it_keeps():
+    """The limit of loky by the name that `worker_memory` sets."""
+    limit = (Path(process_executor.__file__)).read_text("utf-8").count("< _MAX_MEMORY_LEAK_SIZE")
+    assert limit and process_executor._MAX_MEMORY_LEAK_SIZE == math.inf
 
 
 @pytest.fixture

@@ -29,8 +29,8 @@ from holdfast.sensors.types import Array
 Codes = npt.NDArray[np.int8]
 
 NOT_HELD, STILL, CREEPING, SLIDING = range(-1, 3)
-"""Codes of the truth of a slip at a sample. By labels, CREEPING is held time of which nobody knows
-whether the finger slides."""
+"""Codes of the truth of a slip at a sample. By labels, CREEPING is held time without a label, or
+unstable without a cause."""
 
 STILL_SPEED = 0.0003
 """Speed below which a held contact does not slide [m/s]."""

@@ -139,5 +139,5 @@ class HandResponse:
         if self._n_changed == 2:
             self.notice = (
                 f"the response time of the hand changed from {1e3 * self.time:.0f} to "
-                f"{1e3 * response:.0f} ms: start again, so that the law knows it"
+                f"{1e3 * response:.0f} ms: start again with the new one"
             )
