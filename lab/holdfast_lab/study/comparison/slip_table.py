@@ -31,7 +31,7 @@ QUICK_SLIP_METHODS = ("holdfast", "holdfast_stability", "slip_servo", "jl_local_
 """Methods of a quick study."""
 TESTED_ROLES = ("others", "fresh")
 """Roles of the corpora on which the methods are tested, where they exist."""
-TASK_SECONDS = {"holdfast_trees": 60.0, "trees": 40.0}
+TASK_SECONDS = {"holdfast_trees": 100.0, "slip_trees": 60.0}
 """Approximate duration of the slow tasks [s]."""
 OTHER_SECONDS = 20.0
 """Approximate duration of the other tasks [s]."""
