@@ -445,4 +445,4 @@ _STATES = tuple(ContactState)
 
 
 def _not_stable(codes: Codes) -> Mask:
-    return (codes == UNSTABLE) | (codes == NO_CONTACT)
+    return np.asarray((codes == UNSTABLE) | (codes == NO_CONTACT))

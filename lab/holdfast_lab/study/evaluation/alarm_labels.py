@@ -41,7 +41,7 @@ class AlarmLabels:
     @cached_property
     def stable(self) -> Mask:
         """(n,) stable labels."""
-        return self.events.labels == STABLE
+        return np.asarray(self.events.labels == STABLE)
 
     @cached_property
     def counted_seconds(self) -> float:

@@ -12,7 +12,9 @@ from holdfast.sensors.taxel_numbers import FIRST_TAXEL, taxel_number
 
 MAX_NAME = 200
 """Maximum length of a name that can say finger, taxel and axis [characters]."""
-MODULE_OF_ROWS = re.compile(r"(?:(?:sensor|module|finger)(?:[_ ]?id)?|id|name)", re.IGNORECASE)
+MODULE_OF_ROWS = re.compile(
+    r"(?:(?:sensor|module|finger|device|source|topic)(?:[_ ]?id)?|id|name)", re.IGNORECASE
+)
 """Names of a column with the module of each row."""
 EPISODE_OF_ROWS = re.compile(r"(?:episode|trial)(?:[_ ]?(?:id|index))?", re.IGNORECASE)
 """Names of a column with the recording of each row."""

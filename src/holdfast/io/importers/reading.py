@@ -49,6 +49,8 @@ DEFAULT_MODULE = "finger1"
 """Name of the module if nothing names one."""
 MAX_BEYOND_SHARE = 0.5
 """Share of samples beyond the range of a device above which they are no faults of it."""
+MAX_OTHER_SHARE = 0.5
+"""Share of taxels with a reading up to which the rows of a module are those of another device."""
 
 Rows = npt.NDArray[np.intp]
 """Indices of samples of a table."""
@@ -142,6 +144,7 @@ class _Reader:
                 f"{len(track.modules)} modules by columns and {len(by_module)} by rows given; one "
                 "of both expected"
             )
+        by_module = self._with_readings(by_module, readings)
         first = next(iter(by_module.values()))
         times = self._times(track, first, len(values))
         for episode, of_episode in self._episodes(track, times, first).items():
@@ -161,6 +164,20 @@ class _Reader:
                     labels = self._labels(track, module, rows[is_sample], tactile)
                     end = f"{track.recording}{episode and '-' + episode}"
                     yield end, module, replace(tactile, labels=labels)
+
+    def _with_readings(self, by_module: dict[str, Rows], readings: Array) -> dict[str, Rows]:
+        """Return the modules by rows, without other devices, which fill few of the cells."""
+        is_read = np.isfinite(readings)
+        share = {
+            name: is_read[rows].all(axis=-1).any(axis=0).mean() for name, rows in by_module.items()
+        }
+        others = [name for name in share if share[name] <= MAX_OTHER_SHARE]
+        if max(share.values()) < 1:
+            return by_module
+        if others:
+            text = "left out, because most of its taxels have no reading: "
+            self.notes.append(text + ", ".join(others))
+        return {name: rows for name, rows in by_module.items() if name not in others}
 
     def _skin(self, track: Track, module: str, readings: npt.NDArray[Any], unit: str) -> Sensor:
         """Return the sensor, without its range if most samples cannot come from the device.
@@ -267,7 +284,9 @@ class _Reader:
         problem = (
             "" if of_times.restarts(times[first]) else of_times.check_steps(name, times[first])
         )
-        if not problem or np.mean(~of_times.increasing(times[first])) <= of_times.MAX_STEPS_BACK:
+        is_back = np.diff(times[first]) <= 0
+        few_back = np.mean(~of_times.increasing(times[first])) <= of_times.MAX_STEPS_BACK
+        if not problem or (is_back.any() and few_back):
             return times
         columns = {other: array.read() for other, array in track.beside.items() if other != name}
         if turning := of_times.turning_columns(times, columns):
@@ -300,7 +319,9 @@ class _Reader:
         if text is not None:
             choose("time", str(self._columns).partition(",")[0][5:], "as given", is_said=True)
             return self._column(track, text)
-        names = of_times.time_names([name for name in track.beside if name not in track.used])
+        names = self._own_times(
+            track, of_times.time_names([name for name in track.beside if name not in track.used])
+        )
         if not names and (rate := rate_beside(self.layout, track)):
             self.layout.columns = replace(self._columns, time=rate)
             choose("time", rate, "a number beside the array", is_said=True)
@@ -322,6 +343,22 @@ class _Reader:
         self.layout.used.add(best)
         return best
 
+    @staticmethod
+    def _own_times(track: Track, names: list[str]) -> list[str]:
+        """Return the columns of times that name the module of a track; all if none does.
+
+        Raises:
+            RecordingError: each of several modules has a column of its own.
+        """
+        own = {module: [n for n in names if module and module in n] for module in track.modules}
+        named = [found[0] for found in own.values() if found]
+        if len(set(named)) > 1:
+            raise RecordingError(
+                f"times of each module given ({', '.join(named)}), one column for all of them "
+                "expected: import each by itself, with --columns time=COLUMN,taxels=FIRST..LAST"
+            )
+        return own[track.modules[0]] if named and len(track.modules) == 1 else names
+
     def _in_order(self, times: Array) -> npt.NDArray[np.bool_]:
         """Return which samples have a stamp after all before; a few may step back."""
         kept = of_times.increasing(times) | ~np.isfinite(times)
@@ -342,6 +379,12 @@ class _Reader:
                 texts = _texts(track.beside[name])
                 cells[kind] = [texts[row].strip() for row in rows]
                 self.layout.used.add(name)
+        # Numbers are classes of another program; a column that the user names must have our words.
+        given = set(cells.get("label", ())) - {""}
+        if given and not self._columns.label and all(re.fullmatch(r"[\d.]+", x) for x in given):
+            text = f"labels {', '.join(sorted(given)[:3])} are not used: words are expected"
+            self.notes.extend([text] if text not in self.notes else [])
+            return ()
         # A label says UNKNOWN by having no state.
         states = [s.value.lower() for s in ContactState if s is not ContactState.UNKNOWN]
         pairs: list[tuple[ContactState, Cause | None] | None] = []

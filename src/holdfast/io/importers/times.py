@@ -23,6 +23,8 @@ DOUBTFUL_RATES = (5.0, 5000.0)
 """Outside of these rates, times whose name has no unit are not taken as seconds [Hz]."""
 UNIX_TIME = (1e9, 4e9)
 """Times of a clock that counts from 1970 [s], of the years 2001 to 2096."""
+MAX_STEP = 86_400.0
+"""Longest step between two samples of one recording [s]: a clock that jumps by days was set."""
 MAX_STEPS_BACK = 0.01
 """Share of samples that are left out because their stamps step back."""
 SMOOTHER = 0.5
@@ -126,6 +128,12 @@ def times_of(name: str, values: Array, unit: str | None, nominal: float) -> Time
         return Times(values * TIME_UNITS[used], used)
     likely = min(TIME_UNITS, key=lambda u: abs(math.log(step * TIME_UNITS[u] * nominal)))
     its_rate = 1 / (step * TIME_UNITS[likely])
+    mean_rate = (len(values) - 1) / ((values[-1] - values[0]) * TIME_UNITS[used] or np.inf)
+    if stated and unit is None and low <= mean_rate <= high:
+        raise RecordingError(
+            f"column {name!r} with samples that come in bursts given, evenly spaced ones expected: "
+            f"give --columns time={mean_rate:.4g}Hz, their mean rate"
+        )
     if stated:
         raise RecordingError(
             f"column {name!r} with steps of {step:.6g} given, {rate:.4g} Hz in {stated}; "
@@ -224,7 +232,7 @@ def true_rate(times: Array) -> float | None:
 
 
 def check_steps(name: str, times: Array) -> str:
-    """Return what is wrong with times that do not increase; empty if they do.
+    """Return what is wrong with times that do not increase, or jump by days; empty if they do not.
 
     Raises:
         RecordingError: a time is missing.
@@ -235,6 +243,10 @@ def check_steps(name: str, times: Array) -> str:
         row = int(np.flatnonzero(~np.isfinite(times))[0])
         raise RecordingError(f"column {name!r} has no time in row {row + 1} of the samples")
     if not len(wrong):
+        jumps = np.flatnonzero(steps > MAX_STEP)
+        if len(jumps):
+            at = int(jumps[0])
+            return f"times of {name} jump by {steps[at]:.4g} s at sample {at + 2}"
         return ""
     first = int(wrong[0])
     before, after = times[first], times[first + 1]

@@ -127,7 +127,8 @@ class Layout:
 
     def propose_sensor(self, n_taxels: int, unit: str | None, reason: str = "") -> Sensor:
         """Return a sensor of so many taxels, and propose it."""
-        unit = self.columns.unit or unit
+        given = next(iter(self.sensors.values()), None)
+        unit = self.columns.unit or unit or (given.unit if given is not None else None)
         kept = next((kept for kept, units in READING_UNITS.items() if unit in units), None)
         fitting = [sensor(name) for name in built_in_sensors()]
         fitting = [x for x in fitting if x.n_taxels == n_taxels and kept in (None, x.unit)]
