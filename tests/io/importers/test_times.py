@@ -73,3 +73,9 @@ def test_a_cell_that_is_no_time():
     assert clock_seconds(["0.5"]) is None
     with pytest.raises(RecordingError, match="'12:61'"):
         clock_seconds(["12:00:00", "12:61"])
+
+
+def test_stamps_in_bursts_are_refused_with_their_mean_rate():
+    bursts = 1.7e9 + np.arange(200) // 10 * 0.1 + np.arange(200) % 10 * 1e-5
+    with pytest.raises(RecordingError, match=r"in bursts .* --columns time=10[0-9.]*Hz"):
+        times_of("time", bursts, None, 100)

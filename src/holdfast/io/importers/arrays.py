@@ -233,6 +233,10 @@ def arrays_of_columns(path: Path, file: Any, names: list[str]) -> dict[str, Stor
     table = file.read(columns=wanted, use_threads=False)
     for name in wanted:
         column = table[name].combine_chunks()
+        if column.null_count and hasattr(column.type, "value_type"):
+            shape = next((np.shape(cell.as_py()) for cell in column if cell.is_valid), ())
+            empty = np.full(shape, np.nan).tolist()
+            column = pa.array([empty if cell is None else cell for cell in column.to_pylist()])
         lengths = [len(column)]
         while hasattr(column.type, "value_type"):
             n_before = len(column)

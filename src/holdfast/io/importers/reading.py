@@ -156,8 +156,16 @@ class _Reader:
                     self._raw.append((module, track, raw))
                     part = mended(raw.copy(), self._columns.missing, self._columns.wrap)
                     is_sample = np.isfinite(part).any(axis=(1, 2))
-                    # A sample without a reading is none, if a number stands for it.
-                    is_sample |= self._columns.missing is None
+                    # A row without a reading is no sample if a number stands for it, or if there is
+                    # one between any two samples: the rows of a faster device.
+                    is_sparse = (
+                        is_sample.any()
+                        and of_times.median_step(np.flatnonzero(is_sample).astype(np.float64)) > 1
+                    )
+                    if self._columns.missing is None and is_sparse:
+                        n_empty = np.count_nonzero(~is_sample)
+                        self.notes.append(f"{n_empty} rows without a reading are left out")
+                    is_sample |= self._columns.missing is None and not is_sparse
                     numbers = with_integer_type(factor * part[is_sample])
                     skin = self._skin(track, module, numbers, kept)
                     tactile = Tactile(skin, times[rows][is_sample], numbers, kept)  # type: ignore[arg-type]

@@ -47,7 +47,8 @@ def arrays_of_records(records: Iterable[Mapping[str, Any]]) -> dict[str, StoredA
     Records with arrays of the same names and shapes are one group; those of the largest group have
     paths without a first name. Of a list of records with x, y and z, such as fx, fy and fz, the
     three become one array, in the order of the ids of the records. Numbers beside their `shape`
-    have it. What not all records of a group have is left out.
+    have it. A number that most records of a group have is NaN in the others; all else that not all
+    have is left out.
 
     Args:
         records: values by name: numbers, texts, lists of numbers or of records, and records.
@@ -64,10 +65,13 @@ def arrays_of_records(records: Iterable[Mapping[str, Any]]) -> dict[str, StoredA
         rows = groups[key]
         words = [word for word in key[: len(KIND_NAMES)] if isinstance(word, str)]
         prefix = "" if len(with_arrays) == 1 else f"{'/'.join(words) or f'part{k + 1}'}/"
-        for name in rows[0]:
+        for name in dict.fromkeys(name for row in rows for name in row):
             values = [row[name] for row in rows if name in row]
-            is_alike = len({(np.shape(x), isinstance(x, str)) for x in values}) == 1
-            if len(values) == len(rows) and is_alike:
+            forms = {(np.shape(x), isinstance(x, str)) for x in values}
+            is_number = forms == {((), False)}
+            if is_number and 2 * len(values) > len(rows):
+                values = [row.get(name, np.nan) for row in rows]
+            if len(values) == len(rows) and len(forms) == 1:
                 arrays.setdefault(prefix + name, in_memory(np.array(values)))
     return arrays
 

@@ -248,6 +248,11 @@ def check_steps(name: str, times: Array) -> str:
             at = int(jumps[0])
             return f"times of {name} jump by {steps[at]:.4g} s at sample {at + 2}"
         return ""
+    if len(wrong) == len(steps) and (steps < 0).all():
+        raise RecordingError(
+            f"times of {name} that fall from sample to sample given, rising ones expected: the "
+            f"newest row is first, so sort them: pandas.read_csv(FILE).sort_values({name!r})"
+        )
     first = int(wrong[0])
     before, after = times[first], times[first + 1]
     what = "go back" if after < before else "stand still"
