@@ -358,7 +358,10 @@ class _Reader:
         Raises:
             RecordingError: each of several modules has a column of its own.
         """
-        own = {module: [n for n in names if module and module in n] for module in track.modules}
+        words = {name: re.split(r"[\W_]+", name) for name in names}  # `l` is not in `elapsed`
+        own = {
+            module: [n for n in names if module and module in words[n]] for module in track.modules
+        }
         named = [found[0] for found in own.values() if found]
         if len(set(named)) > 1:
             raise RecordingError(
